@@ -1,0 +1,33 @@
+# Every target does its own set-up (scripts/setup.sh); a second call finds it done.
+ROBOT ?= config/renda2021.yaml
+IN_ENV := scripts/in_env.sh
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo run test soak lint clean
+
+help: ## show this list
+	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 15
+
+setup: ## ROS 2 (sourced, or a venv) and the built workspace
+	@scripts/setup.sh
+
+demo: setup ## stream the two sweeps of Fig. 4 through the node, check every tip, draw demo/fig4.png
+	@$(IN_ENV) python3 -m ctr_pvs_ros.demo --output demo
+
+run: setup ## serve equilibria until Ctrl-C; another robot: make run ROBOT=path.yaml
+	@$(IN_ENV) equilibrium_node --ros-args --params-file config/equilibrium_node.yaml -p robot_file:=$(ROBOT)
+
+lint: setup ## style, format and types
+	@$(IN_ENV) ruff check .
+	@$(IN_ENV) ruff format --check .
+	@$(IN_ENV) mypy
+
+test: lint ## lint, solver tests and node tests
+	@$(IN_ENV) python3 -m pytest
+
+soak: setup ## the long tests
+	@$(IN_ENV) python3 -m pytest -m soak
+
+clean: ## remove everything that make has made
+	rm -rf .venv .ws demo .mypy_cache .pytest_cache .ruff_cache
+	find ctr_pvs ctr_pvs_ros test -name __pycache__ -prune -exec rm -rf {} +

@@ -1,0 +1,7 @@
+"""`python -m ctr_pvs` is `ctr-pvs`."""
+
+import sys
+
+from ctr_pvs.cli import main
+
+sys.exit(main())

@@ -1,0 +1,183 @@
+"""The command line, ctr-pvs SUBCOMMAND: what the user writes becomes a call of the library, its answer text.
+
+A subcommand is two functions here, one that declares its arguments and one that runs it and returns an exit code.
+Bad input is one line on standard error; standard output is for answers only.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from collections.abc import Callable
+from collections.abc import Sequence
+from typing import NoReturn
+
+from ctr_pvs import Equilibrium
+from ctr_pvs import EquilibriumSolver
+from ctr_pvs import Status
+from ctr_pvs import load_robot
+from ctr_pvs.errors import FieldError
+from ctr_pvs.errors import RobotFileError
+from ctr_pvs.report import answer_as_json
+from ctr_pvs.report import answer_as_text
+
+SUCCESS = 0
+BAD_INPUT = 2
+NO_STABLE_EQUILIBRIUM = 3
+NO_ANSWER_IN_TIME_OR_TOLERANCE = 4
+
+EXIT_CODES = (
+    "Exit codes: 0 success, 2 bad input, 3 no stable equilibrium, 4 not converged, tolerance missed or out of time."
+)
+
+MOST_POSES = 100_000
+
+
+class UsageError(ValueError):
+    """Arguments that cannot be meant. The message is one line."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Runs one subcommand.
+
+    Args:
+        argv: the words after the program's name; those of the process when None.
+
+    Returns:
+        The exit code, see EXIT_CODES.
+    """
+    words = sys.argv[1:] if argv is None else argv
+    try:
+        arguments = _parser().parse_args(_shielded(words))
+        run: Callable[[argparse.Namespace], int] = arguments.run
+        return run(arguments)
+    except (UsageError, FieldError, RobotFileError) as error:
+        print("ctr-pvs:", " ".join(str(error).splitlines()), file=sys.stderr)
+        return BAD_INPUT
+
+
+def _declare_solve(subcommands: argparse._SubParsersAction[_Parser]) -> None:
+    solve = subcommands.add_parser(
+        "solve",
+        allow_abbrev=False,
+        help="one equilibrium: shape, torques, forces, stability",
+        description="Solves for the equilibrium of a robot. Give one rotation and one translation per tube, outermost "
+        "first. The model has no friction and no clearance, and is quasi-static.",
+    )
+    solve.add_argument("robot", metavar="ROBOT", help="robot file (YAML)")
+    solve.add_argument(
+        "--alpha", nargs="+", type=_number, required=True, metavar="A", help="base rotation of each tube [rad]"
+    )
+    solve.add_argument(
+        "--D", nargs="+", type=_number, required=True, metavar="D", help="base-to-orifice distance of each tube [m]"
+    )
+    solve.add_argument("--degrees", action="store_true", help="--alpha is in degrees; text output shows degrees too")
+    solve.add_argument(
+        "--tolerance", type=_number, default=1e-5, metavar="M", help="largest error of the tip [m] (%(default)g)"
+    )
+    solve.add_argument(
+        "--fidelity",
+        choices=("auto", "torsionless", "torsion", "full"),
+        default="auto",
+        help="the model; auto takes the smallest that meets the tolerance",
+    )
+    solve.add_argument(
+        "--start",
+        choices=("cold", "lowest-energy"),
+        default="cold",
+        help="which equilibrium where there are several: cold follows the path from the relaxed robot",
+    )
+    solve.add_argument(
+        "--force-model",
+        choices=("virtual_work", "renda2021"),
+        default="virtual_work",
+        help="insertion forces: dE/dD, or eq. (41) of Renda et al. 2021",
+    )
+    solve.add_argument(
+        "--poses", type=_pose_count, default=51, metavar="N", help="poses along the backbone, in --json (%(default)s)"
+    )
+    solve.add_argument("--json", action="store_true", help="print the answer as JSON, in SI units")
+    solve.set_defaults(run=_solve)
+
+
+def _solve(arguments: argparse.Namespace) -> int:
+    robot = load_robot(arguments.robot)
+    alpha = [math.radians(angle) for angle in arguments.alpha] if arguments.degrees else arguments.alpha
+    solver = EquilibriumSolver(
+        robot,
+        tolerance=arguments.tolerance,
+        fidelity=arguments.fidelity,
+        force_model=arguments.force_model,
+    )
+    equilibrium = solver.solve(alpha, arguments.D, start=arguments.start)
+    if arguments.json:
+        print(answer_as_json(equilibrium, arguments.poses))
+    else:
+        print(answer_as_text(robot, equilibrium, arguments.degrees))
+    return _exit_code(equilibrium)
+
+
+def _exit_code(equilibrium: Equilibrium) -> int:
+    if equilibrium.success:
+        return SUCCESS
+    if equilibrium.status is Status.NO_STABLE_EQUILIBRIUM:
+        return NO_STABLE_EQUILIBRIUM
+    return NO_ANSWER_IN_TIME_OR_TOLERANCE
+
+
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong in one line, without the usage before it."""
+
+    def error(self, message: str) -> NoReturn:
+        raise UsageError(f"{message} (see {self.prog} --help)")
+
+
+def _parser() -> _Parser:
+    parser = _Parser(
+        prog="ctr-pvs",
+        allow_abbrev=False,
+        description="Equilibria of concentric tube robots.",
+        epilog=EXIT_CODES,
+    )
+    subcommands = parser.add_subparsers(metavar="SUBCOMMAND", required=True)
+    for declare in (_declare_solve,):
+        declare(subcommands)
+    return parser
+
+
+def _shielded(words: Sequence[str]) -> list[str]:
+    """The words with negative numbers made safe from argparse, which takes -1e-3 and -inf for options.
+
+    A leading space is enough: it is no part of an option's name, and `float` ignores it. `--alpha=-1 0` is cut in two
+    first, because argparse would give `--alpha=...` that one value only.
+    """
+    shielded: list[str] = []
+    for word in words:
+        option, equals, value = word.partition("=")
+        if option.startswith("--") and equals and _is_number(value):
+            shielded += [option, f" {value}"]
+        else:
+            shielded.append(f" {word}" if word.startswith("-") and _is_number(word) else word)
+    return shielded
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _number(text: str) -> float:
+    if not _is_number(text) or not math.isfinite(float(text)):
+        raise argparse.ArgumentTypeError(f"expected a finite number, got {text.strip()!r}")
+    return float(text)
+
+
+def _pose_count(text: str) -> int:
+    value = _number(text)
+    if value != int(value) or not 2 <= value <= MOST_POSES:
+        raise argparse.ArgumentTypeError(f"expected a whole number from 2 to {MOST_POSES}, got {text.strip()!r}")
+    return int(value)

@@ -1,0 +1,164 @@
+"""The elastic energy E(q; alpha, D) at the `torsion` level, its gradient and its Hessian.
+
+With no load outside, the bending part of the seed's eq. (26)/(33) is solved at each point by
+``k = (sum K_j)^-1 sum K_j R(psi_j) kappa*_j``, and what is left is
+
+    E = q.q / 2  +  sum over sections int  w(psi) ds  +  straightening in the guide,
+    w = sum K_j |kappa*_j - exp(-i psi_j) k|^2 / 2,      psi = alpha + A q,
+
+in complex notation for the two bending directions (kappa_y + i kappa_z).  Everything the package reports is a
+derivative of this one scalar.  Only coupled sections depend on psi; in all others w is a constant of the section.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ctr_pvs.basis import LegendreRule
+from ctr_pvs.basis import gauss_legendre
+from ctr_pvs.materials import Materials
+from ctr_pvs.twist import TwistSpace
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+#: Gauss points in a section where psi is not needed: exact for pre-curvatures up to degree 7, near exact for helices.
+PLAIN_NODES = 8
+
+
+def shared_curvature(bending: Array, moment: ComplexArray) -> ComplexArray:
+    """Curvature k [1/m] of the backbone where tubes with stiffnesses ``bending`` (..., N) [N m^2] share the bending
+    ``moment`` (..., N), K_j exp(i psi_j) kappa*_j: the balance of eq. (26), point by point."""
+    return moment.sum(axis=-1) / bending.sum(axis=-1)
+
+
+def bending_density(bending: Array, pre_curvature: ComplexArray, psi: Array) -> Array:
+    """Energy density w [J/m] (...) of tubes that share one curvature; a sum of squares, so nothing cancels."""
+    turn = np.exp(1j * psi)
+    k = shared_curvature(bending, bending * pre_curvature * turn)
+    return 0.5 * np.sum(bending * np.abs(pre_curvature - k[..., None] / turn) ** 2, axis=-1)
+
+
+@dataclass(frozen=True, eq=False)
+class SectionNodes:
+    """Gauss points of one section: where the energy density is sampled.
+
+    s, weight : (g,) arc lengths [m] and quadrature weights [m]; bending (N,) K; kappa (g, N) pre-curvatures [1/m].
+    """
+
+    section: int
+    rule: LegendreRule
+    s: Array
+    weight: Array
+    bending: Array
+    kappa: ComplexArray
+
+
+class TorsionEnergy:
+    """E at one D and one polynomial degree, as a function of q (n,) and alpha (N,).
+
+    n : number of unknowns; nodes : the coupled sections' Gauss points; angle_map (G, N, n) : psi = alpha + A q there.
+    """
+
+    def __init__(self, materials: Materials, degree: int) -> None:
+        self.materials = materials
+        self.space = TwistSpace(materials, degree)
+        self.n = self.space.n
+        self.nodes = [self._nodes(int(m), self.space.rule()) for m in np.flatnonzero(materials.coupled)]
+        tubes = materials.robot.n_tubes
+        stacked = [self.space.angle_map(node.section, node.rule.x) for node in self.nodes]
+        self.angle_map = np.concatenate([np.zeros((0, tubes, self.n)), *stacked])
+        self.moment = np.concatenate(
+            [np.zeros((0, tubes), complex), *(node.bending * node.kappa for node in self.nodes)]
+        )
+        sums = np.concatenate([np.zeros(0), *(np.full(len(node.s), node.bending.sum()) for node in self.nodes)])
+        weights = np.concatenate([np.zeros(0), *(node.weight for node in self.nodes)])
+        self.coupling = weights / sums  # quadrature weight over total bending stiffness
+        self.slices = self._node_slices()
+
+    def _nodes(self, m: int, rule: LegendreRule) -> SectionNodes:
+        domain = self.materials.domain
+        length = domain.lengths[m]
+        s = domain.boundaries[m] + length * rule.x
+        kappa = self.materials.pre_curvature(m, s)
+        return SectionNodes(m, rule, s, length * rule.weights, self.materials.bending[m], kappa)
+
+    def _node_slices(self) -> list[slice]:
+        ends = np.cumsum([0, *(len(node.s) for node in self.nodes)])
+        return [slice(a, b) for a, b in itertools.pairwise(ends)]
+
+    def plain_nodes(self) -> list[SectionNodes]:
+        """Gauss points of the sections whose energy does not depend on psi."""
+        rule = gauss_legendre(0, PLAIN_NODES)
+        return [self._nodes(int(m), rule) for m in np.flatnonzero(~self.materials.coupled)]
+
+    def angles(self, q: Array, alpha: Array) -> Array:
+        """psi (G, N) [rad] at the nodes."""
+        return alpha + self.angle_map @ q
+
+    def turned_moments(self, psi: Array) -> ComplexArray:
+        """(G, N) K_j kappa*_j exp(i psi_j) [N m] at the nodes."""
+        return self.moment * np.exp(1j * psi)
+
+    def torque_density(self, moments: ComplexArray) -> Array:
+        """(G, N) derivative of E with respect to psi at the nodes (quadrature weights included) [N m]."""
+        total = moments.sum(axis=1).conj()
+        return self.coupling[:, None] * (total[:, None] * moments).imag
+
+    def value(self, q: Array, alpha: Array) -> float:
+        """E [J] up to the constants of ``constant``: the part that depends on q."""
+        psi = self.angles(q, alpha)
+        bending = sum(
+            float(node.weight @ bending_density(node.bending, node.kappa, psi[part]))
+            for node, part in zip(self.nodes, self.slices, strict=True)
+        )
+        return 0.5 * float(q @ q) + bending
+
+    def constant(self) -> float:
+        """Energy [J] that does not depend on twist: uncoupled sections and straightening in the guide."""
+        plain = sum(
+            float(node.weight @ bending_density(node.bending, node.kappa, np.zeros(node.kappa.shape)))
+            for node in self.plain_nodes()
+        )
+        return plain + float(self.materials.straightening_energy.sum())
+
+    def gradient(self, q: Array, alpha: Array) -> Array:
+        """dE/dq (n,) [sqrt(J)]."""
+        torque = self.torque_density(self.turned_moments(self.angles(q, alpha)))
+        return q + np.tensordot(torque, self.angle_map, 2)
+
+    def derivatives(self, q: Array, alpha: Array) -> tuple[Array, Array]:
+        """dE/dq (n,) and d2E/dq2 (n, n)."""
+        moments = self.turned_moments(self.angles(q, alpha))
+        gradient = q + np.tensordot(self.torque_density(moments), self.angle_map, 2)
+        hessian = self.curvature_form(moments, self.angle_map)
+        hessian[np.diag_indices(self.n)] += 1.0
+        return gradient, hessian
+
+    def curvature_form(self, moments: ComplexArray, directions: Array) -> Array:
+        """(p, p) second derivative of the bending energy along psi-directions (G, N, p).
+
+        w'' = (delta_ij Re(conj(Z) b_j) - Re(conj(b_i) b_j)) / sum K with b the turned moments and Z their sum: a
+        diagonal minus a form of rank two at each node.
+        """
+        total = moments.sum(axis=1).conj()
+        diagonal = self.coupling[:, None] * (total[:, None] * moments).real
+        p = directions.shape[2]
+        flat = directions.reshape(-1, p)
+        root = np.sqrt(self.coupling)[:, None]
+        along = np.einsum("gn,gnp->gp", root * moments.real, directions)
+        across = np.einsum("gn,gnp->gp", root * moments.imag, directions)
+        return (flat * diagonal.reshape(-1, 1)).T @ flat - along.T @ along - across.T @ across
+
+    def torque_change(self, moments: ComplexArray, change: ComplexArray, part: slice) -> Array:
+        """(g, N, P) change of ``torque_density`` at the nodes ``part`` for changes (g, N, P) of their turned
+        moments."""
+        here = moments[part]
+        total = here.sum(axis=1).conj()
+        swing = change.sum(axis=1).conj()
+        mixed = swing[:, None, :] * here[:, :, None] + total[:, None, None] * change
+        return self.coupling[part, None, None] * mixed.imag

@@ -1,0 +1,153 @@
+"""The answer to one command: an equilibrium and everything derived from it, each computed when first asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from dataclasses import field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ctr_pvs.actuation import Loads
+from ctr_pvs.actuation import virtual_work_loads
+from ctr_pvs.backbone import Backbone
+from ctr_pvs.backbone import Pose
+from ctr_pvs.backbone import bishop_frames
+from ctr_pvs.backbone import material_poses
+from ctr_pvs.energy import TorsionEnergy
+from ctr_pvs.jacobian import tip_jacobian
+from ctr_pvs.shape import Shape
+from ctr_pvs.stability import stability_margin
+from ctr_pvs.status import NoEquilibriumError
+from ctr_pvs.status import Status
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """What came of one command.
+
+    alpha, D : (N,) the command [rad], [m].
+    status, message : the outcome, in one word and in one line; ``success`` is true for "ok" and "snap".
+    fidelity : model level; degrees_of_freedom : number of unknowns solved for.
+    error_estimate : estimated tip error of discretisation and integration [m]; NaN without an equilibrium.
+    residual : largest twist [rad] that the unbalanced torque left after the solve would cause; NaN likewise.
+    iterations : Newton iterations spent on the way from the start to this answer.
+
+    Shapes and loads raise ``NoEquilibriumError`` where there is no equilibrium.  Where the tolerance was missed they
+    are there, while ``success`` is false.
+    """
+
+    alpha: Array
+    D: Array
+    status: Status
+    message: str
+    tolerance: float
+    fidelity: str
+    error_estimate: float = np.nan
+    residual: float = np.nan
+    iterations: int = 0
+    _energy: TorsionEnergy | None = field(default=None, repr=False)
+    _q: Array | None = field(default=None, repr=False)
+
+    @property
+    def success(self) -> bool:
+        return self.status.success
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        return self._solved()[0].n
+
+    def solved_state(self) -> tuple[TorsionEnergy, Array, Array]:
+        """The energy that was minimised, alpha (N,) and the unknowns q (n,): what ``Sensitivity`` takes."""
+        energy, q = self._solved()
+        return energy, self.alpha, q
+
+    def _solved(self) -> tuple[TorsionEnergy, Array]:
+        if self._energy is None or self._q is None:
+            raise NoEquilibriumError(f"no equilibrium to show ({self.status.value}): {self.message}")
+        return self._energy, self._q
+
+    @cached_property
+    def shape(self) -> Shape:
+        """Twist and curvature fields."""
+        energy, q = self._solved()
+        return Shape(energy.space, self.alpha, q)
+
+    @cached_property
+    def tip(self) -> Pose:
+        """Pose of the far end: material frame of the tube that reaches farthest (ties: the innermost)."""
+        end = self.backbone_at(np.array([0.0, self.shape.domain.length]))
+        return Pose(end.position[-1], end.orientation[-1])
+
+    def backbone(self, n: int) -> Backbone:
+        """``n`` >= 2 poses at equal spacing from the orifice to the tip; x is the tangent, roll that of ``tip``."""
+        if n < 2:
+            raise ValueError(f"n: expected at least 2 poses (orifice and tip), got {n}")
+        return self.backbone_at(np.linspace(0.0, self.shape.domain.length, n))
+
+    def backbone_at(self, s: Array) -> Backbone:
+        """Poses at increasing arc lengths ``s`` (g,) [m] between 0 and the robot's length."""
+        frames = bishop_frames(self.shape, s, self.integration_tolerance)
+        return material_poses(self.shape, self.shape.leader, s, frames)
+
+    def tube_backbone(self, tube: int, n: int) -> Backbone:
+        """``n`` >= 2 poses of one tube's material frame from the orifice to its own tip; ``tube`` counts from 0."""
+        end = max(0.0, float(self.shape.space.materials.robot.tubes[tube].length - self.D[tube]))
+        s = np.linspace(0.0, min(end, self.shape.domain.length), n)
+        return material_poses(self.shape, tube, s, bishop_frames(self.shape, s, self.integration_tolerance))
+
+    @property
+    def integration_tolerance(self) -> float:
+        """Share of the tolerance [m] that integrating the backbone may use."""
+        return 0.1 * self.tolerance
+
+    def twist(self, s: Array) -> Array:
+        """psi (g, N) [rad] of each tube at arc lengths ``s`` (g,) [m]; NaN past a tube's tip."""
+        return self.shape.angles_at(np.asarray(s, dtype=float))
+
+    @cached_property
+    def loads(self) -> Loads:
+        """Actuation loads by virtual work."""
+        return virtual_work_loads(self._solved()[0], self.shape)
+
+    @property
+    def torque(self) -> Array:
+        """(N,) dE/dalpha [N m]: what the actuators supply along +alpha."""
+        return self.loads.torque
+
+    @property
+    def force(self) -> Array:
+        """(N,) dE/dD towards +D [N]; insertion force, as surgeons count it, is its negative."""
+        return self.loads.force
+
+    @property
+    def force_interval(self) -> Array:
+        """(N, 2) dE/dD towards -D and towards +D [N]; equal away from kinks."""
+        return self.loads.force_interval
+
+    @property
+    def kink(self) -> bool:
+        """True if some D_j sits on a kink of the energy, where the holding force is an interval."""
+        return bool(self.loads.kink.any())
+
+    @cached_property
+    def energy(self) -> float:
+        """Elastic energy [J], straightening in the guide counted."""
+        energy, q = self._solved()
+        return energy.value(q, self.alpha) + energy.constant()
+
+    @cached_property
+    def stability_margin(self) -> float:
+        """Smallest eigenvalue of the energy Hessian relative to torsional stiffness, clipped at 1; NaN without
+        equilibrium."""
+        if self._energy is None or self._q is None:
+            return float("nan")
+        return stability_margin(self._energy, self._q, self.alpha)
+
+    @cached_property
+    def jacobian(self) -> Array:
+        """(6, 2 N) rates of the tip: position [m] and rotation [rad] in base axes, by alpha [1/rad] then D [1/m]."""
+        return tip_jacobian(self._solved()[0], self.shape, self.integration_tolerance)

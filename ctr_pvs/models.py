@@ -1,0 +1,36 @@
+"""The energies of one robot, by base positions and polynomial degree; the last few are kept."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ctr_pvs.energy import TorsionEnergy
+from ctr_pvs.materials import Materials
+from ctr_pvs.robot import Robot
+from ctr_pvs.sections import piecewise_domain
+
+#: Rotations at one D reuse everything; a path along D needs the latest positions at a few degrees.
+KEPT = 16
+
+
+class Models:
+    """Builds ``TorsionEnergy`` for (D, degree), or returns the one it kept."""
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
+        self._kept: OrderedDict[tuple[bytes, int], TorsionEnergy] = OrderedDict()
+
+    def energy(self, D: NDArray[np.float64], degree: int) -> TorsionEnergy:
+        """The energy at ``D`` (N,) [m] with twist rates of polynomial ``degree`` in coupled sections."""
+        key = (D.tobytes(), degree)
+        if key in self._kept:
+            self._kept.move_to_end(key)
+            return self._kept[key]
+        energy = TorsionEnergy(Materials(self.robot, piecewise_domain(self.robot, D)), degree)
+        self._kept[key] = energy
+        if len(self._kept) > KEPT:
+            self._kept.popitem(last=False)
+        return energy

@@ -1,0 +1,198 @@
+"""From a robot file to a Robot. What the keys mean stands in `load_robot`; what values may be, mostly in `robot`."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import replace
+
+from ctr_pvs.errors import RobotFileError
+from ctr_pvs.file_table import Table
+from ctr_pvs.robot import DIAMETER_RANGE
+from ctr_pvs.robot import LARGEST_CURVATURE
+from ctr_pvs.robot import LARGEST_TURN
+from ctr_pvs.robot import LENGTH_RANGE
+from ctr_pvs.robot import MODULUS_RANGE
+from ctr_pvs.robot import STIFFNESS_RANGE
+from ctr_pvs.robot import Limits
+from ctr_pvs.robot import Robot
+from ctr_pvs.robot import Segment
+from ctr_pvs.robot import Tube
+from ctr_pvs.robot import annulus_stiffness
+from ctr_pvs.robot import check_diameters
+from ctr_pvs.robot import shear_modulus_from_poisson
+from ctr_pvs.strict_yaml import read_yaml
+
+_MODULI = ("youngs_modulus", "shear_modulus", "poissons_ratio")
+_STIFFNESSES = ("bending_stiffness", "torsional_stiffness")
+_DIAMETERS = ("inner_diameter", "outer_diameter")
+_MATERIAL = (*_MODULI, *_STIFFNESSES, *_DIAMETERS)
+_POLYNOMIAL = ("curvature_y", "curvature_z")
+_HELIX = ("curvature", "turn")
+
+_TWO_WAYS = (
+    "give youngs_modulus, shear_modulus or poissons_ratio, and both diameters, "
+    "or else bending_stiffness and torsional_stiffness"
+)
+
+# A coefficient c_k counts as c_k X^k, so its own size says little; this only keeps sums finite.
+_LARGEST_COEFFICIENT = 1e100
+
+
+def load_robot(path: str | os.PathLike[str]) -> Robot:
+    """The robot that a YAML file describes.
+
+    ::
+
+        name: renda2021
+        tubes:                       # outermost first
+          - name: outer              # becomes part of joint names
+            youngs_modulus: 58.0e9   # Pa
+            shear_modulus: 21.5e9    # Pa; or poissons_ratio
+            inner_diameter: 2.01e-3  # m
+            outer_diameter: 2.39e-3  # m
+            segments:                # from the base to the tip
+              - {length: 93.5e-3}                       # m; straight
+              - {length: 92.3e-3, curvature_y: [9.9]}   # polynomial in the segment's own abscissa, 1/m, 1/m^2, ...
+        limits:                      # optional, what the actuators can reach
+          alpha: {outer: [-3.2, 3.2]}                   # rad
+          D: {outer: [0.0, 0.15]}                       # m
+
+    In place of the moduli, `bending_stiffness` and `torsional_stiffness` [N m^2] may be given; diameters then only
+    serve to check that tubes fit. A segment may give any of these keys again, for itself: for example the stiffnesses
+    of a patterned stretch. A helical segment has `curvature` [1/m] and `turn` [rad/m] in place of the polynomials.
+
+    Raises:
+        RobotFileError: for anything that cannot be read or breaks a rule, naming file, key path, value and rule.
+    """
+    file = os.fspath(path)
+    content = read_yaml(path)
+    if not isinstance(content, dict):
+        raise RobotFileError(file, "", content, "a mapping with the keys name and tubes")
+    top = Table(file, "", content)
+    top.refuse_other_keys(("name", "tubes", "limits"))
+    name = top.require("name", "the robot's name")
+    tubes = tuple(_tube(table) for table in top.tables("tubes", "tube"))
+    with top.blamed():
+        robot = Robot(name, tubes)  # so that limits are read against names known to be good
+        return replace(robot, limits=_limits(top.table("limits"), [tube.name for tube in tubes]))
+
+
+def _tube(table: Table) -> Tube:
+    table.refuse_other_keys(("name", "segments", *_MATERIAL))
+    name = table.require("name", "the tube's name")
+    material = _material(table)
+    stretches = []
+    for entry in table.tables("segments", "segment"):
+        entry.refuse_other_keys(("length", *_POLYNOMIAL, *_HELIX, *_MATERIAL))
+        stretches.append((entry, _overridden(material, _material(entry))))
+    segments = tuple(_segment(entry, values) for entry, values in stretches)
+    inner = [values["inner_diameter"] for _, values in stretches if "inner_diameter" in values]
+    outer = [values["outer_diameter"] for _, values in stretches if "outer_diameter" in values]
+    with table.blamed():
+        return Tube(name, segments, min(inner, default=None), max(outer, default=None))
+
+
+def _segment(table: Table, material: Mapping[str, float]) -> Segment:
+    length = table.number("length", *LENGTH_RANGE, "m")
+    coefficients, turn = _pre_curvature(table)
+    bending_stiffness, torsional_stiffness = _stiffness(table, material)
+    # A law of too much curvature is blamed on the key that makes it.
+    written = next((key for key in (*_POLYNOMIAL, "curvature") if key in table), "curvature")
+    blame = {f"curvature[{index}]": written for index in range(len(coefficients))}
+    with table.blamed(blame):
+        return Segment(length, bending_stiffness, torsional_stiffness, coefficients, turn)
+
+
+def _pre_curvature(table: Table) -> tuple[tuple[complex, ...], float]:
+    """(coefficients c_k, turn) as `Segment` takes them."""
+    polynomial = [key for key in _POLYNOMIAL if key in table]
+    helix = [key for key in _HELIX if key in table]
+    if helix and polynomial:
+        raise table.error(helix[0], f"either curvature and turn or {polynomial[0]}, not both", "remove one of them")
+    if helix:
+        for key, what in (("curvature", "the helix' curvature in 1/m"), ("turn", "the helix' turn in rad/m")):
+            table.require(key, what, "a helix has both; write curvature_y: [...] for a plane arc")
+        curvature = table.number("curvature", -LARGEST_CURVATURE, LARGEST_CURVATURE, "1/m")
+        return (complex(curvature),), table.number("turn", -LARGEST_TURN, LARGEST_TURN, "rad/m")
+    y, z = (table.numbers(key, -_LARGEST_COEFFICIENT, _LARGEST_COEFFICIENT) for key in _POLYNOMIAL)
+    count = max(len(y), len(z))
+    y, z = (values + [0.0] * (count - len(values)) for values in (y, z))
+    return tuple(map(complex, y, z)), 0.0
+
+
+def _material(table: Table) -> dict[str, float]:
+    """The material keys given at one level, a tube's or a segment's, checked on their own."""
+    material = {}
+    for keys, low, high, unit in (
+        (("youngs_modulus", "shear_modulus"), *MODULUS_RANGE, "Pa"),
+        (_STIFFNESSES, *STIFFNESS_RANGE, "N m^2"),
+        (_DIAMETERS, *DIAMETER_RANGE, "m"),
+    ):
+        material.update({key: table.number(key, low, high, unit) for key in keys if key in table})
+    if "poissons_ratio" in table:
+        material["poissons_ratio"] = _poissons_ratio(table)
+    moduli = [key for key in _MODULI if key in table]
+    stiffnesses = [key for key in _STIFFNESSES if key in table]
+    if moduli and stiffnesses:
+        raise table.error(stiffnesses[0], f"stiffness given one way, but {moduli[0]} is here too", _TWO_WAYS)
+    if "shear_modulus" in table and "poissons_ratio" in table:
+        raise table.error("poissons_ratio", "either shear_modulus or poissons_ratio, not both", "remove one of them")
+    if all(key in material for key in _DIAMETERS):
+        with table.blamed():
+            check_diameters(material["inner_diameter"], material["outer_diameter"])
+    return material
+
+
+def _poissons_ratio(table: Table) -> float:
+    value = table.number("poissons_ratio", -1.0, 0.5)
+    if value == -1.0:  # the shear modulus would be infinite
+        raise table.error("poissons_ratio", "a number above -1 and at most 0.5")
+    return value
+
+
+def _overridden(tube: Mapping[str, float], segment: Mapping[str, float]) -> dict[str, float]:
+    """The tube's material with the segment's own in its place, also where that puts it another way.
+
+    Only moduli need room made for them: where stiffnesses are there as well, `_stiffness` looks no further.
+    """
+    replaced: set[str] = set()
+    if any(key in segment for key in _MODULI):
+        replaced.update(_STIFFNESSES)
+    if "shear_modulus" in segment or "poissons_ratio" in segment:
+        replaced.update(("shear_modulus", "poissons_ratio"))
+    return {key: value for key, value in tube.items() if key not in replaced} | dict(segment)
+
+
+def _stiffness(table: Table, material: Mapping[str, float]) -> tuple[float, float]:
+    """(K, G J) [N m^2] of one segment; errors stand at the segment, though its tube may hold the missing key."""
+
+    def require(key: str, what: str) -> float:
+        if key not in material:
+            raise table.error(key, f"{what}, for the segment or its whole tube", _TWO_WAYS)
+        return material[key]
+
+    if any(key in material for key in _DIAMETERS):
+        inner, outer = (require(key, "both diameters or neither") for key in _DIAMETERS)
+        with table.blamed():
+            check_diameters(inner, outer)
+    if any(key in material for key in _STIFFNESSES):
+        bending, torsional = (require(key, "both stiffnesses") for key in _STIFFNESSES)
+        return bending, torsional
+    youngs_modulus = require("youngs_modulus", "Young's modulus in Pa")
+    if "poissons_ratio" in material:
+        shear_modulus = shear_modulus_from_poisson(youngs_modulus, material["poissons_ratio"])
+    else:
+        shear_modulus = require("shear_modulus", "the shear modulus in Pa")
+    inner, outer = (require(key, "a diameter in m") for key in _DIAMETERS)
+    return annulus_stiffness(youngs_modulus, shear_modulus, inner, outer)
+
+
+def _limits(table: Table, names: list[str]) -> Limits:
+    table.refuse_other_keys(("alpha", "D"))
+    limits = {}
+    for kind in ("alpha", "D"):
+        entries = table.table(kind)
+        entries.refuse_other_keys(names, "tube")
+        limits[kind] = tuple(entries.values.get(name) for name in names)
+    return Limits(limits["alpha"], limits["D"])

@@ -1,0 +1,55 @@
+"""From equilibria to ROS messages; pure conversions."""
+
+from __future__ import annotations
+
+import numpy as np
+from geometry_msgs.msg import Point
+from geometry_msgs.msg import Pose
+from geometry_msgs.msg import PoseArray
+from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import Quaternion
+from numpy.typing import NDArray
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+from std_msgs.msg import Header
+from std_msgs.msg import MultiArrayDimension
+
+from ctr_pvs import Backbone
+from ctr_pvs import Equilibrium
+from ctr_pvs_ros.commands import joint_positions
+
+
+def pose_of(position: NDArray[np.float64], orientation: NDArray[np.float64]) -> Pose:
+    """A Pose from position (3,) [m] and unit quaternion (4,) xyzw."""
+    x, y, z = position.tolist()
+    qx, qy, qz, qw = orientation.tolist()
+    return Pose(position=Point(x=x, y=y, z=z), orientation=Quaternion(x=qx, y=qy, z=qz, w=qw))
+
+
+def joint_state_of(equilibrium: Equilibrium, names: tuple[str, ...], header: Header) -> JointState:
+    """The solved command as position [rad and m], torque and force as effort [N m and N]; in the order of `names`."""
+    return JointState(
+        header=header,
+        name=list(names),
+        position=joint_positions(equilibrium.alpha, equilibrium.D),
+        effort=joint_positions(equilibrium.torque, equilibrium.force),
+    )
+
+
+def tip_of(equilibrium: Equilibrium, header: Header) -> PoseStamped:
+    """The tip, m."""
+    return PoseStamped(header=header, pose=pose_of(equilibrium.tip.position, equilibrium.tip.orientation))
+
+
+def backbone_of(backbone: Backbone, header: Header) -> PoseArray:
+    """The backbone from the orifice to the tip, m."""
+    poses = [pose_of(*row) for row in zip(backbone.position, backbone.orientation, strict=True)]
+    return PoseArray(header=header, poses=poses)
+
+
+def arc_length_of(backbone: Backbone) -> Float64MultiArray:
+    """The arc length of each backbone pose beyond the orifice, m."""
+    message = Float64MultiArray(data=backbone.s.tolist())
+    count = len(message.data)
+    message.layout.dim = [MultiArrayDimension(label="s", size=count, stride=count)]
+    return message

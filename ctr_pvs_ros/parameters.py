@@ -1,0 +1,156 @@
+"""The node's parameters: one table with description, unit, range and default, read into a frozen Settings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from dataclasses import fields
+from typing import Any
+
+from rcl_interfaces.msg import FloatingPointRange
+from rcl_interfaces.msg import IntegerRange
+from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+MAX_BACKBONE_POSES = 10_000
+
+
+@dataclass(frozen=True)
+class Settings:
+    """The values of all parameters; see PARAMETERS for what each means."""
+
+    robot_file: str
+    frame_id: str
+    tolerance: float
+    fidelity: str
+    force_model: str
+    initial_command: tuple[float, ...]
+    publish_backbone_s: bool
+    backbone_poses: int
+    on_snap: str
+    command_timeout: float
+    compute_budget: float
+    merge_partial: bool
+    clamp_to_limits: bool
+    accept_nameless: bool
+    margin_warn: float
+    margin_stop: float
+
+
+@dataclass(frozen=True)
+class ParameterRule:
+    """What is declared for one parameter. `bounds` is inclusive; `choices` lists the allowed strings."""
+
+    default: Any
+    description: str
+    bounds: tuple[float, float] | None = None
+    choices: tuple[str, ...] = ()
+    read_only: bool = False
+
+
+PARAMETERS: dict[str, ParameterRule] = {
+    "robot_file": ParameterRule("", "Path of the robot file (YAML). Required.", read_only=True),
+    "frame_id": ParameterRule(
+        "ctr_base", "Frame of all poses: origin at the insertion orifice, +x along the insertion.", read_only=True
+    ),
+    "tolerance": ParameterRule(
+        1e-5, "Largest estimated tip error of an answer [m].", bounds=(1e-10, 1.0), read_only=True
+    ),
+    # Which levels and force models there are is the solver's to say.
+    "fidelity": ParameterRule("auto", "Model level; auto picks the smallest that meets the tolerance.", read_only=True),
+    "force_model": ParameterRule(
+        "virtual_work",
+        "How insertion forces are computed; virtual_work: derivative of the elastic energy.",
+        read_only=True,
+    ),
+    "initial_command": ParameterRule(
+        Parameter.Type.DOUBLE_ARRAY,
+        "Command solved at start-up: all rotations [rad], then all translations [m], outermost first. Unset: none.",
+        read_only=True,
+    ),
+    "publish_backbone_s": ParameterRule(
+        False, "Publish the arc length of each backbone pose [m] on backbone_s.", read_only=True
+    ),
+    "backbone_poses": ParameterRule(
+        60, "Number of poses on the backbone, both ends included.", bounds=(2, MAX_BACKBONE_POSES)
+    ),
+    "on_snap": ParameterRule(
+        "follow",
+        "When a command makes the tubes snap: follow publishes the landing, hold keeps the answer before the snap, "
+        "stop holds and refuses all further commands until this parameter is set again.",
+        choices=("follow", "hold", "stop"),
+    ),
+    "command_timeout": ParameterRule(
+        0.0, "Diagnostics say stale when no command came for this long [s]; 0: never.", bounds=(0.0, 86400.0)
+    ),
+    "compute_budget": ParameterRule(1.0, "Wall-clock limit of one solve [s].", bounds=(1e-4, 60.0)),
+    "merge_partial": ParameterRule(
+        False, "Complete a command that names only some joints from the last accepted one; otherwise refuse it."
+    ),
+    "clamp_to_limits": ParameterRule(
+        False, "Move a command outside the limits to the nearest one inside, and report it; otherwise refuse it."
+    ),
+    "accept_nameless": ParameterRule(
+        False, "Accept a JointState without names: rotation and translation of each tube in turn, outermost first."
+    ),
+    "margin_warn": ParameterRule(
+        0.1, "Diagnostics warn below this stability margin [no unit, 1 far from a fold, 0 at it].", bounds=(0.0, 1.0)
+    ),
+    "margin_stop": ParameterRule(
+        0.0,
+        "Answers below this stability margin are not published [no unit]; 0: all stable ones are.",
+        bounds=(0.0, 1.0),
+    ),
+}
+
+
+class ParameterError(ValueError):
+    """A parameter value that passes its type and range but breaks another rule."""
+
+
+def declare(node: Node) -> None:
+    """Declare all parameters; raises rclpy's ParameterException for a value of a wrong type or out of range."""
+    for name, rule in PARAMETERS.items():
+        node.declare_parameter(name, rule.default, _descriptor(rule))
+
+
+def read(node: Node, changed: Mapping[str, Any] | None = None) -> Settings:
+    """The declared parameters as they are, or as they would be with `changed`; raises ParameterError."""
+    values = {field.name: _value(node, field.name) for field in fields(Settings)}
+    values.update({name: value for name, value in (changed or {}).items() if name in values})
+    values["initial_command"] = tuple(values["initial_command"] or ())
+    settings = Settings(**values)
+    _check(settings)
+    return settings
+
+
+def _value(node: Node, name: str) -> Any:
+    return node.get_parameter_or(name, Parameter(name, Parameter.Type.NOT_SET)).value
+
+
+def _descriptor(rule: ParameterRule) -> ParameterDescriptor:
+    descriptor = ParameterDescriptor(description=rule.description, read_only=rule.read_only)
+    if rule.choices:
+        descriptor.additional_constraints = "one of: " + ", ".join(rule.choices)
+    if rule.bounds is not None and isinstance(rule.default, int):
+        descriptor.integer_range = [IntegerRange(from_value=int(rule.bounds[0]), to_value=int(rule.bounds[1]))]
+    elif rule.bounds is not None:
+        descriptor.floating_point_range = [FloatingPointRange(from_value=rule.bounds[0], to_value=rule.bounds[1])]
+    return descriptor
+
+
+def _check(settings: Settings) -> None:
+    """The rules that a descriptor cannot express."""
+    for name, rule in PARAMETERS.items():
+        value = getattr(settings, name)
+        if rule.choices and value not in rule.choices:
+            raise ParameterError(f"parameter {name}: expected one of {', '.join(rule.choices)}, got {value!r}")
+    if not settings.robot_file:
+        raise ParameterError("parameter robot_file: expected the path of a robot file, got nothing")
+    if not all(map(math.isfinite, settings.initial_command)):
+        raise ParameterError(f"parameter initial_command: expected finite numbers, got {settings.initial_command}")
+    if settings.margin_stop > settings.margin_warn:
+        limit = f"at most margin_warn ({settings.margin_warn:g})"
+        raise ParameterError(f"parameter margin_stop: expected {limit}, got {settings.margin_stop:g}")

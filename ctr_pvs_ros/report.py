@@ -1,0 +1,121 @@
+"""What the node tells on /diagnostics: counters and the state of the last command, as one DiagnosticStatus."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections import deque
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticStatus
+from diagnostic_msgs.msg import KeyValue
+
+from ctr_pvs import Status
+from ctr_pvs_ros.commands import Command
+from ctr_pvs_ros.commands import RejectedCommand
+from ctr_pvs_ros.stream import Answer
+
+SOLVE_TIMES_KEPT = 1000
+
+
+class Report:
+    """Counts what happens to commands. Times are judged by receipt on a steady clock."""
+
+    def __init__(self) -> None:
+        self._counts = Counter(accepted=0, published=0, rejected=0, clamped=0, snaps=0, zero_stamps=0)
+        self._reasons: Counter[str] = Counter()
+        self._solve_times: deque[float] = deque(maxlen=SOLVE_TIMES_KEPT)
+        self._answer: Answer | None = None
+        self._last_rejection = ""
+        self._last_clamp = ""
+        self._news: list[str] = []  # rejections and clampings since the last status
+        self._received: float | None = None
+        self._header_age = float("nan")
+
+    def received(self, header_age: float | None) -> None:
+        """A command came, its stamp `header_age` [s] before its receipt; None: it had a zero stamp."""
+        self._received = time.monotonic()
+        self._header_age = float("nan") if header_age is None else header_age
+        self._counts["zero_stamps"] += header_age is None
+
+    def rejected(self, rejection: RejectedCommand) -> None:
+        """The command changed nothing."""
+        self._counts["rejected"] += 1
+        self._reasons[rejection.reason.value] += 1
+        self._last_rejection = f"{rejection.reason.value}: {rejection}"
+        self._news.append(f"command rejected: {self._last_rejection}")
+
+    def answered(self, command: Command, answer: Answer) -> None:
+        """The command was accepted and solved."""
+        self._answer = answer
+        self._solve_times.append(answer.solve_time)
+        self._counts["accepted"] += 1
+        self._counts["published"] += answer.verdict.publish
+        self._counts["snaps"] += answer.equilibrium.status is Status.SNAP
+        if command.notes:
+            self._counts["clamped"] += 1
+            self._last_clamp = "; ".join(command.notes)
+            self._news.append(f"command clamped: {self._last_clamp}")
+
+    def status(self, name: str, hardware_id: str, command_timeout: float) -> DiagnosticStatus:
+        """The state since start-up; rejections and clampings warn once, in the first status after them."""
+        level, message = self._summary(command_timeout)
+        self._news.clear()
+        values = self._count_values() | self._answer_values()
+        return DiagnosticStatus(
+            level=level,
+            name=name,
+            hardware_id=hardware_id,
+            message=message,
+            values=[KeyValue(key=key, value=value) for key, value in values.items()],
+        )
+
+    def _summary(self, command_timeout: float) -> tuple[bytes, str]:
+        news = self._news[-1] if self._news else ""
+        if self._answer is not None and not self._answer.verdict.publish:
+            return DiagnosticStatus.ERROR, self._answer.verdict.remark
+        age = self._age()
+        if command_timeout > 0.0 and age > command_timeout:
+            return DiagnosticStatus.STALE, f"no command for {age:.1f} s (command_timeout is {command_timeout:g} s)"
+        remark = news or (self._answer.verdict.remark if self._answer is not None else "")
+        if remark:
+            return DiagnosticStatus.WARN, remark
+        return DiagnosticStatus.OK, "waiting for the first command" if self._answer is None else "ok"
+
+    def _age(self) -> float:
+        """Time since the last command came, s; infinite before the first."""
+        return float("inf") if self._received is None else time.monotonic() - self._received
+
+    def _count_values(self) -> dict[str, str]:
+        counts = self._counts
+        return {
+            "commands accepted": str(counts["accepted"]),
+            "answers published": str(counts["published"]),
+            "commands rejected": str(counts["rejected"]),
+            "rejected by reason": ", ".join(f"{reason}: {count}" for reason, count in sorted(self._reasons.items())),
+            "last rejection": self._last_rejection,
+            "commands clamped": str(counts["clamped"]),
+            "last clamping": self._last_clamp,
+            "snaps": str(counts["snaps"]),
+            "commands with zero stamp (receipt time used)": str(counts["zero_stamps"]),
+            "time since last command [s]": f"{self._age():.3f}",
+            "last command's stamp age at receipt [s]": f"{self._header_age:.6f}",
+        }
+
+    def _answer_values(self) -> dict[str, str]:
+        if self._answer is None:
+            return {}
+        equilibrium = self._answer.equilibrium
+        median, p95 = np.percentile(self._solve_times, (50, 95)) * 1e3
+        return {
+            "last status": equilibrium.status.value,
+            "last message": equilibrium.message,
+            "stability margin": f"{equilibrium.stability_margin:.6g}",
+            "fidelity": equilibrium.fidelity,
+            "degrees of freedom": str(equilibrium.degrees_of_freedom) if equilibrium.success else "",
+            "error estimate [m]": f"{equilibrium.error_estimate:.3g}",
+            "residual": f"{equilibrium.residual:.3g}",
+            "solve time p50 [ms]": f"{median:.3f}",
+            "solve time p95 [ms]": f"{p95:.3f}",
+            "solve time max [ms]": f"{max(self._solve_times) * 1e3:.3f}",
+        }

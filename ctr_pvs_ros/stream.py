@@ -1,0 +1,91 @@
+"""The command stream: solve each accepted command, and decide whether its answer may go out."""
+
+from __future__ import annotations
+
+import copy
+import time
+from dataclasses import dataclass
+
+from ctr_pvs import Equilibrium
+from ctr_pvs import EquilibriumSolver
+from ctr_pvs import Status
+from ctr_pvs_ros.commands import Command
+from ctr_pvs_ros.commands import Reason
+from ctr_pvs_ros.commands import RejectedCommand
+
+
+@dataclass(frozen=True)
+class Policy:
+    """When an answer is withheld: see the node's parameters of the same names."""
+
+    on_snap: str
+    margin_warn: float
+    margin_stop: float
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether an answer goes out, and why not or with what warning (empty: nothing to say)."""
+
+    publish: bool
+    remark: str = ""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """One solved command: the equilibrium, what is done with it, and the wall-clock time the solve took [s]."""
+
+    equilibrium: Equilibrium
+    verdict: Verdict
+    solve_time: float
+
+
+def judge(equilibrium: Equilibrium, policy: Policy) -> Verdict:
+    """Decide on one answer."""
+    margin = equilibrium.stability_margin
+    if not equilibrium.success:
+        return Verdict(False, f"{equilibrium.status.value}: {equilibrium.message}; the last answer stays")
+    if equilibrium.status is Status.SNAP and policy.on_snap != "follow":
+        return Verdict(False, f"snap held (on_snap is {policy.on_snap}): {equilibrium.message}; the last answer stays")
+    if margin < policy.margin_stop:
+        return Verdict(
+            False, f"stability margin {margin:.3g} is below margin_stop ({policy.margin_stop:g}); the last answer stays"
+        )
+    if equilibrium.status is Status.SNAP:
+        return Verdict(True, f"snap: {equilibrium.message}")
+    if margin < policy.margin_warn:
+        return Verdict(True, f"stability margin {margin:.3g} is below margin_warn ({policy.margin_warn:g})")
+    return Verdict(True)
+
+
+class Stream:
+    """Follows commands one by one; what is not let out leaves no trace in the warm start."""
+
+    def __init__(self, solver: EquilibriumSolver) -> None:
+        self._solver = solver
+        self._stopped = False
+        self.last: Command | None = None  # the command behind the last answer that went out
+
+    def release(self) -> None:
+        """Accept commands again after a snap under on_snap = stop."""
+        self._stopped = False
+
+    def follow(self, command: Command, policy: Policy, budget: float) -> Answer:
+        """Solve for a command from the last answer that went out, within `budget` [s].
+
+        Raises:
+            RejectedCommand: stopped after a snap.
+        """
+        if self._stopped:
+            raise RejectedCommand(Reason.STOPPED, "stopped after a snap; set on_snap to go on")
+        # A withheld answer must not become the place the next command starts from, so the solve runs on a copy.
+        solver = copy.copy(self._solver)
+        began = time.perf_counter()
+        equilibrium = solver.solve(command.alpha, command.D, start="warm", budget=budget)
+        solve_time = time.perf_counter() - began
+        verdict = judge(equilibrium, policy)
+        if verdict.publish:
+            self._solver, self.last = solver, command
+        elif equilibrium.status is Status.SNAP and policy.on_snap == "stop":
+            self._stopped = True
+        return Answer(equilibrium, verdict, solve_time)

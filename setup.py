@@ -1,0 +1,35 @@
+"""Installs the solver, the node, and the data files that ROS looks for under share/ctr_pvs."""
+
+from glob import glob
+
+from setuptools import setup
+
+PACKAGE = "ctr_pvs"
+
+setup(
+    name=PACKAGE,
+    version="0.1.0",
+    description="Equilibrium solver for concentric tube robots, and the ROS 2 node that serves it",
+    maintainer="ctr_pvs maintainers",
+    maintainer_email="maintainers@users.noreply.github.com",
+    license="Apache-2.0",
+    python_requires=">=3.11",
+    packages=["ctr_pvs", "ctr_pvs_ros"],
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
+        (f"share/{PACKAGE}", ["package.xml"]),
+        (f"share/{PACKAGE}/launch", sorted(glob("launch/*.xml"))),
+        (f"share/{PACKAGE}/config", sorted(glob("config/*.yaml"))),
+        (f"share/{PACKAGE}/data", ["test/data/reference_values.json"]),
+    ],
+    install_requires=["numpy>=1.26", "scipy>=1.11", "pyyaml>=6"],
+    extras_require={"test": ["pytest"], "demo": ["matplotlib"]},
+    zip_safe=True,
+    entry_points={
+        "console_scripts": [
+            "ctr-pvs = ctr_pvs.cli:main",
+            "equilibrium_node = ctr_pvs_ros.node:main",
+            "sweep_demo = ctr_pvs_ros.demo:main",
+        ],
+    },
+)

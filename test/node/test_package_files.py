@@ -1,0 +1,104 @@
+"""The launch file, the parameter file and the package files agree with one another. Read as data: no ROS needed."""
+
+import ast
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import yaml
+
+ROOT = Path(__file__).parents[2]
+LAUNCH = ROOT / "launch" / "equilibrium.launch.xml"
+
+
+def setup_arguments() -> dict[str, ast.expr]:
+    """The keyword arguments of setup() in setup.py."""
+    tree = ast.parse((ROOT / "setup.py").read_text(encoding="utf-8"))
+    call = next(node for node in ast.walk(tree) if isinstance(node, ast.Call) and ast.unparse(node.func) == "setup")
+    return {keyword.arg: keyword.value for keyword in call.keywords}
+
+
+def entry_points() -> dict[str, str]:
+    """Executable name -> module:function."""
+    scripts = ast.literal_eval(setup_arguments()["entry_points"])["console_scripts"]
+    return dict(script.split(" = ") for script in scripts)
+
+
+def declared_parameters() -> set[str]:
+    """The keys of the table in ctr_pvs_ros/parameters.py."""
+    tree = ast.parse((ROOT / "ctr_pvs_ros" / "parameters.py").read_text(encoding="utf-8"))
+    table = next(
+        node.value
+        for node in tree.body
+        if isinstance(node, ast.AnnAssign) and ast.unparse(node.target) == "PARAMETERS" and node.value is not None
+    )
+    return {ast.literal_eval(key) for key in table.keys}
+
+
+def test_every_entry_point_exists():
+    for target in entry_points().values():
+        module, function = target.split(":")
+        tree = ast.parse((ROOT / Path(*module.split("."))).with_suffix(".py").read_text(encoding="utf-8"))
+        assert function in {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+
+
+def test_the_launch_file_starts_the_node_with_declared_parameters_only():
+    launch = ET.parse(LAUNCH).getroot()
+    (node,) = launch.iter("node")
+    assert node.get("pkg") == "ctr_pvs"
+    assert node.get("exec") in entry_points()
+    assert node.get("name") == "ctr_equilibrium"
+    names = {element.get("name") for tag in ("param", "set_parameter") for element in launch.iter(tag)}
+    assert names - {None} <= declared_parameters() | {"use_sim_time"}
+
+
+def test_every_launch_argument_is_used_and_described():
+    text = LAUNCH.read_text(encoding="utf-8")
+    arguments = list(ET.fromstring(text).iter("arg"))
+    assert {argument.get("name") for argument in arguments} >= {
+        "robot_file",
+        "namespace",
+        "params_file",
+        "use_sim_time",
+        "initial_command",
+    }
+    for argument in arguments:
+        assert f"$(var {argument.get('name')})" in text
+        assert argument.get("description")
+
+
+def test_files_that_the_launch_file_names_are_installed():
+    installed = ast.unparse(setup_arguments()["data_files"])
+    for argument in ET.parse(LAUNCH).getroot().iter("arg"):
+        default = argument.get("default", "")
+        if default.startswith("$(find-pkg-share ctr_pvs)/"):
+            folder, _, name = default.partition(")/")[2].rpartition("/")
+            assert (ROOT / folder / name).is_file()
+            assert f"glob('{folder}/*{Path(name).suffix}')" in installed
+
+
+def test_the_parameter_file_holds_every_parameter_but_the_ones_without_a_default():
+    content = yaml.safe_load((ROOT / "config" / "equilibrium_node.yaml").read_text(encoding="utf-8"))
+    values = content["/**"]["ros__parameters"]
+    assert set(values) == declared_parameters() - {"robot_file", "initial_command"}
+
+
+def test_both_packages_are_named_for_colcon():
+    defaults = yaml.safe_load((ROOT / "colcon_defaults.yaml").read_text(encoding="utf-8"))
+    for verb in ("build", "list", "test"):
+        for path in defaults[verb]["base-paths"]:
+            assert (ROOT / path / "package.xml").is_file()
+
+
+def test_package_xml_names_every_ros_package_that_is_imported():
+    package = ET.parse(ROOT / "package.xml").getroot()
+    named = {element.text for tag in ("depend", "exec_depend") for element in package.iter(tag)}
+    imported = set()
+    for path in (ROOT / "ctr_pvs_ros").glob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and node.module:
+                imported.add(node.module.split(".")[0])
+    ros = {
+        name for name in imported if name.endswith(("_msgs", "_interfaces")) or name in ("rclpy", "ament_index_python")
+    }
+    assert "rclpy" in ros
+    assert ros <= named

@@ -1,0 +1,40 @@
+"""The launch file, really executed; only where launch is installed (test/node reads it as data everywhere)."""
+
+import signal
+import subprocess
+import sys
+
+import pytest
+from geometry_msgs.msg import PoseStamped
+
+from ctr_pvs_ros.process import share_file
+
+pytest.importorskip("launch_ros", reason="launch_ros is not installed: the launch file is checked as data only")
+
+LAUNCH = """
+import sys
+from launch import LaunchDescription, LaunchService
+from launch.actions import IncludeLaunchDescription
+from launch.launch_description_sources import AnyLaunchDescriptionSource
+arguments = [tuple(argument.split(":=")) for argument in sys.argv[2:]]
+launch = IncludeLaunchDescription(AnyLaunchDescriptionSource(sys.argv[1]), launch_arguments=arguments)
+service = LaunchService()
+service.include_launch_description(LaunchDescription([launch]))
+sys.exit(service.run())
+"""
+
+
+@pytest.mark.parametrize("initial_command", ["[0.0, 0.5, 0.0935, 0.2085]", ""])
+def test_the_launch_file_starts_the_node(graph, find_node, initial_command):
+    name = "with_initial_command" if initial_command else "without_initial_command"
+    file = str(share_file("launch", "equilibrium.launch.xml"))
+    arguments = [f"namespace:={name}", f"initial_command:={initial_command}"]
+    process = subprocess.Popen([sys.executable, "-c", LAUNCH, file, *arguments])
+    try:
+        peer = find_node(f"/{name}")
+        tips = peer.subscribe(PoseStamped, "setpoint_cp")
+        peer.diagnostics()
+        assert len(tips) == bool(initial_command)
+    finally:
+        process.send_signal(signal.SIGINT)
+        assert process.wait(10.0) == 0

@@ -1,0 +1,143 @@
+"""What the parameters change, seen from outside."""
+
+import dataclasses
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
+from geometry_msgs.msg import PoseStamped
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+
+from ctr_pvs_ros.parameters import PARAMETERS
+from ctr_pvs_ros.parameters import Settings
+
+JOINTS = ["outer_rotation", "outer_translation", "inner_rotation", "inner_translation"]
+GOOD = dict(zip(JOINTS, (0.0, 0.0935, 0.5, 0.2085), strict=True))
+TIMEOUT = 5.0
+
+
+@pytest.fixture(scope="module")
+def lenient(start_node):
+    return start_node(
+        "/lenient",
+        merge_partial="true",
+        clamp_to_limits="true",
+        accept_nameless="true",
+        publish_backbone_s="true",
+        backbone_poses="5",
+        command_timeout="1.5",
+        initial_command="[0.0, 0.5, 0.0935, 0.2085]",
+    )
+
+
+@pytest.fixture(scope="module")
+def strict(start_node):
+    return start_node("/strict", margin_stop="0.6", margin_warn="0.995")
+
+
+def test_nothing_is_published_before_the_first_command(strict):
+    tips = strict.subscribe(PoseStamped, "setpoint_cp")
+    status, values = strict.diagnostics()
+    assert tips == []
+    assert status.message == "waiting for the first command"
+    assert values["commands accepted"] == "0"
+
+
+def test_the_initial_command_is_answered(lenient):
+    positions = lenient.subscribe(JointState, "setpoint_js")
+    lenient.wait(lambda: bool(positions), "initial answer")
+    assert positions[0].position.tolist() == list(GOOD.values())
+
+
+def test_arc_lengths_come_beside_the_backbone(lenient):
+    arrays = lenient.subscribe(Float64MultiArray, "backbone_s")
+    lenient.wait(lambda: bool(arrays), "arc lengths")
+    assert arrays[0].data.tolist() == pytest.approx([0.0, 0.02375, 0.0475, 0.07125, 0.095])
+
+
+def test_a_partial_command_is_merged_with_the_last_one(lenient):
+    lenient.client.command(GOOD, TIMEOUT)
+    reply = lenient.client.command({"inner_rotation": 0.7}, TIMEOUT)
+    assert reply.joints.position.tolist() == [0.0, 0.0935, 0.7, 0.2085]
+    assert len(reply.backbone.poses) == 5
+
+
+def test_a_command_out_of_limits_is_clamped_and_reported(lenient):
+    reply = lenient.client.command({**GOOD, "inner_translation": 0.5}, TIMEOUT)
+    assert reply.joints.position.tolist() == [0.0, 0.0935, 0.5, 0.3035]
+    status, values = lenient.diagnostics()
+    assert status.level == DiagnosticStatus.WARN
+    assert "'inner'" in values["last clamping"]
+
+
+def test_a_nameless_command_is_taken_in_order(lenient):
+    positions = lenient.subscribe(JointState, "setpoint_js")
+    lenient.wait(lambda: bool(positions), "last answer")
+    positions.clear()
+    lenient.send(JointState(position=[0.1, 0.09, 0.2, 0.2]))
+    lenient.wait(lambda: bool(positions), "answer")
+    assert positions[0].position.tolist() == [0.1, 0.09, 0.2, 0.2]
+
+
+def test_a_command_that_stays_away_is_stale(lenient):
+    lenient.client.command(GOOD, TIMEOUT)
+    status, _ = lenient.diagnostics(lambda values: float(values["time since last command [s]"]) > 1.5)
+    assert status.level == DiagnosticStatus.STALE
+    assert "command_timeout" in status.message
+
+
+def test_an_answer_near_a_fold_is_withheld(strict):
+    full_overlap = {**GOOD, "inner_rotation": 4.5379}  # 260 deg, margin 0.99
+    before = strict.client.command(full_overlap, TIMEOUT)
+    status, _ = strict.diagnostics(lambda values: values["answers published"] == "1")
+    assert status.level == DiagnosticStatus.WARN
+    assert "margin_warn" in status.message
+    tips = strict.subscribe(PoseStamped, "setpoint_cp")
+    strict.wait(lambda: bool(tips), "last answer")
+    strict.send(JointState(name=JOINTS, position=[0.0, 0.0935, 4.8869, 0.2085]))  # 280 deg, margin 0.45
+    status, values = strict.diagnostics(lambda values: values["commands accepted"] == "2")
+    assert status.level == DiagnosticStatus.ERROR
+    assert "margin_stop" in status.message
+    assert values["answers published"] == "1"
+    assert tips == [before.tip]
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("backbone_poses", 1, "out of range"),
+        ("compute_budget", float("nan"), "out of range"),
+        ("compute_budget", 1, "type"),
+        ("on_snap", "jump", "follow, hold, stop"),
+        ("margin_stop", 0.999, "margin_warn"),
+        ("robot_file", "other.yaml", "read-only"),
+    ],
+)
+def test_a_wrong_value_is_refused_with_the_reason(strict, name, value, words):
+    result = strict.set_parameter(name, value)
+    assert not result.successful
+    assert words in result.reason
+
+
+def test_a_right_value_takes_effect(strict):
+    assert strict.set_parameter("backbone_poses", 3).successful
+    assert len(strict.client.command(GOOD, TIMEOUT).backbone.poses) == 3
+
+
+def test_nodes_in_two_namespaces_do_not_hear_each_other(strict, lenient):
+    first = strict.client.command(GOOD, TIMEOUT)
+    second = lenient.client.command({**GOOD, "inner_rotation": -0.5}, TIMEOUT)
+    assert first.tip.pose.position.y == pytest.approx(-second.tip.pose.position.y, abs=1e-7)
+    again = strict.subscribe(PoseStamped, "setpoint_cp")
+    strict.wait(lambda: bool(again), "last answer")
+    assert again == [first.tip]
+
+
+def test_the_table_and_the_settings_have_the_same_names():
+    assert list(PARAMETERS) == [field.name for field in dataclasses.fields(Settings)]
+
+
+def test_the_parameter_file_repeats_the_defaults(strict):
+    """Checked on a running node: what its file sets and no test changes is what the table says."""
+    for name in ("frame_id", "tolerance", "fidelity", "force_model", "publish_backbone_s", "accept_nameless"):
+        assert strict.get_parameter(name) == PARAMETERS[name].default

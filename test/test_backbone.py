@@ -1,0 +1,155 @@
+"""Integration on SE(3): closed forms, order, an independent integrator, quaternions, and the tip Jacobian."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from random_robots import random_D
+from random_robots import random_robot
+from scipy.integrate import solve_ivp
+from scipy.linalg import expm
+from scipy.spatial.transform import Rotation
+
+from ctr_pvs import EquilibriumSolver
+from ctr_pvs import Robot
+from ctr_pvs import Segment
+from ctr_pvs import Tube
+from ctr_pvs.backbone import STEP_NODES
+from ctr_pvs.backbone import bishop_frames
+from ctr_pvs.backbone import cumulative_product
+from ctr_pvs.backbone import exponential
+from ctr_pvs.backbone import magnus_exponent
+
+
+def test_exponential_is_that_of_the_matrix():
+    rng = np.random.default_rng(0)
+    for size in (1e-9, 1e-3, 9.9e-3, 1.1e-2, 0.5, 3.0, 7.0):
+        w, v = size * rng.standard_normal(3), rng.standard_normal(3)
+        hat = np.zeros((4, 4))
+        hat[:3, :3] = [[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]]
+        hat[:3, 3] = v
+        assert exponential(w[None], v[None])[0] == pytest.approx(expm(hat), abs=1e-13)
+
+
+def test_cumulative_product_keeps_the_order():
+    rng = np.random.default_rng(1)
+    matrices = rng.standard_normal((11, 4, 4))
+    expected = np.eye(4)
+    for matrix, found in zip(matrices, cumulative_product(matrices), strict=True):
+        expected = expected @ matrix
+        assert found == pytest.approx(expected, rel=1e-10, abs=1e-10)
+
+
+def test_magnus_is_of_sixth_order():
+    """A curvature that turns and grows: the error falls 64-fold when steps are halved, against a tight integrator."""
+
+    def k(s):
+        return (6.0 + 30.0 * s) * np.exp(1j * (25.0 * s + 40.0 * s**2))
+
+    def slope(s, y):
+        turn = np.array([[0, -k(s).imag, k(s).real], [k(s).imag, 0, 0], [-k(s).real, 0, 0]])
+        frame = y[:9].reshape(3, 3)
+        return np.concatenate([(frame @ turn).ravel(), frame[:, 0]])
+
+    start = np.concatenate([np.eye(3).ravel(), np.zeros(3)])
+    exact = solve_ivp(slope, (0.0, 0.2), start, rtol=1e-13, atol=1e-15, method="DOP853").y[9:, -1]
+    errors = []
+    for steps in (8, 16, 32):
+        h = np.full(steps, 0.2 / steps)
+        s = (np.arange(steps)[:, None] + STEP_NODES) * h[:, None]
+        errors.append(np.linalg.norm(cumulative_product(exponential(*magnus_exponent(h, k(s))))[-1, :3, 3] - exact))
+    assert errors[0] / errors[1] > 40 and errors[1] / errors[2] > 40
+    assert errors[2] < 1e-9
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8, 1e-10])
+def test_the_step_rule_keeps_the_tolerance(tolerance):
+    """Over random robots, the tip is within the asked tolerance of one integrated with far smaller steps."""
+    worst = 0.0
+    for seed in range(25):
+        rng = np.random.default_rng([seed, 11])
+        robot = random_robot(rng, 2 + seed % 3, strength=1.5)
+        answer = EquilibriumSolver(robot, tolerance=1e-4).solve(rng.uniform(-2, 2, robot.n_tubes), random_D(rng, robot))
+        if not answer.success:
+            continue
+        ends = np.array([0.0, answer.shape.domain.length])
+        fine = bishop_frames(answer.shape, ends, tolerance * 1e-5)[-1, :3, 3]
+        worst = max(worst, np.linalg.norm(bishop_frames(answer.shape, ends, tolerance)[-1, :3, 3] - fine) / tolerance)
+    assert worst < 1.0
+
+
+def test_poses_along_the_backbone():
+    """First pose at the orifice, last at the tip, equal spacing, x along the tangent, unit and sign-continuous
+    quaternions."""
+    rng = np.random.default_rng(4)
+    robot = random_robot(rng, 3)
+    answer = EquilibriumSolver(robot, tolerance=1e-8).solve([0.4, 2.0, -3.0], random_D(rng, robot))
+    poses = answer.backbone(61)
+    assert len(poses) == 61 and poses.s[0] == 0.0 and poses.s[-1] == answer.shape.domain.length
+    assert np.array_equal(poses.position[0], np.zeros(3))
+    assert poses.position[-1] == pytest.approx(answer.tip.position, abs=1e-9)
+    assert poses.orientation[-1] == pytest.approx(answer.tip.orientation, abs=1e-8)
+    assert np.linalg.norm(poses.orientation, axis=1) == pytest.approx(np.ones(61), abs=1e-14)
+    assert np.sum(poses.orientation[1:] * poses.orientation[:-1], axis=1).min() > 0.5
+    tangent = Rotation.from_quat(poses.orientation).as_matrix()[:, :, 0]
+    chord = np.diff(poses.position, axis=0)
+    spacing = poses.s[1]
+    assert np.all(np.linalg.norm(chord, axis=1) <= spacing + 1e-12)
+    middle = tangent[1:] + tangent[:-1]
+    cosine = np.sum(chord * middle, axis=1) / np.linalg.norm(chord, axis=1) / np.linalg.norm(middle, axis=1)
+    assert cosine.min() > 0.999
+    with pytest.raises(ValueError, match="n: expected at least 2"):
+        answer.backbone(1)
+
+
+def test_each_tube_has_its_own_roll():
+    """Tube poses share the backbone's points and tangents; they differ by the tubes' twist, and end at their own
+    tips."""
+    rng = np.random.default_rng(6)
+    robot = random_robot(rng, 3)
+    D = random_D(rng, robot)
+    answer = EquilibriumSolver(robot, tolerance=1e-8).solve([0.0, 1.0, 2.0], D)
+    for j, tube in enumerate(robot.tubes):
+        own = answer.tube_backbone(j, 7)
+        assert own.s[-1] == pytest.approx(tube.length - D[j], abs=1e-12)
+        shared = answer.backbone_at(own.s)
+        assert own.position == pytest.approx(shared.position, abs=1e-9)
+        between = Rotation.from_quat(shared.orientation).inv() * Rotation.from_quat(own.orientation)
+        psi = answer.twist(own.s)
+        expected = psi[:, j] - psi[:, answer.shape.leader]
+        turn = np.column_stack([expected, np.zeros(7), np.zeros(7)])
+        assert (between * Rotation.from_rotvec(turn).inv()).magnitude() == pytest.approx(np.zeros(7), abs=1e-9)
+
+
+def test_the_sign_of_quaternions_follows_the_unwrapped_angle():
+    """Turning a lone tube by a full turn carries the quaternion to its negative without a jump on the way."""
+    robot = Robot("one", (Tube("a", (Segment(0.1, 0.05, 0.04, (10.0,)),)),))
+    solver = EquilibriumSolver(robot)
+    first = last = solver.solve([0.0], [0.02]).tip.orientation
+    for angle in np.linspace(0.0, 2 * np.pi, 41):
+        tip = solver.solve([angle], [0.02]).tip.orientation
+        assert tip @ last > 0.9
+        last = tip
+    assert last == pytest.approx(-first, abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_tip_jacobian_matches_differences(seed):
+    rng = np.random.default_rng([seed, 21])
+    robot = random_robot(rng, 2 + seed % 3)
+    n, h = robot.n_tubes, 1e-5
+    alpha, D = rng.uniform(-1.5, 1.5, n), random_D(rng, robot)
+    solver = EquilibriumSolver(robot, tolerance=1e-9)
+    here = solver.solve(alpha, D)
+    assert here.success, here.message
+    assert here.jacobian.shape == (6, 2 * n)
+    for index in range(2 * n):
+        shift = np.zeros(2 * n)
+        shift[index] = h
+        ahead, behind = (solver.solve(alpha + s * shift[:n], D + s * shift[n:]) for s in (1, -1))
+        if {here.shape.domain.topology} != {a.shape.domain.topology for a in (ahead, behind)}:
+            continue  # the difference would cross a kink
+        move = (ahead.tip.position - behind.tip.position) / (2 * h)
+        turn = Rotation.from_quat(ahead.tip.orientation) * Rotation.from_quat(behind.tip.orientation).inv()
+        expected = np.concatenate([move, turn.as_rotvec() / (2 * h)])
+        assert here.jacobian[:, index] == pytest.approx(expected, rel=2e-5, abs=2e-5)

@@ -1,0 +1,376 @@
+"""Robots built in Python: what the constructors take, derive and refuse, and which commands a robot takes."""
+
+from __future__ import annotations
+
+import copy
+import math
+import pickle
+from dataclasses import FrozenInstanceError
+
+import numpy as np
+import pytest
+
+from ctr_pvs.errors import CommandError
+from ctr_pvs.errors import RobotError
+from ctr_pvs.robot import Limits
+from ctr_pvs.robot import Robot
+from ctr_pvs.robot import Segment
+from ctr_pvs.robot import Tube
+from ctr_pvs.robot import annulus_stiffness
+from ctr_pvs.robot import shear_modulus_from_poisson
+
+STRAIGHT = Segment(0.125, 0.05, 0.04)
+ARC = Segment(0.025, 0.05, 0.04, (9.9,))
+
+
+def make_robot(limits: Limits | None = None) -> Robot:
+    """Two tubes, 0.15 m and 0.275 m long."""
+    outer = Tube("outer", (STRAIGHT, ARC), 2.01e-3, 2.39e-3)
+    inner = Tube("inner", (STRAIGHT, STRAIGHT, ARC), 0.0, 1.6e-3)
+    return Robot("pair", (outer, inner), limits or Limits())
+
+
+# --- segments ---------------------------------------------------------------------------------------------------------
+
+
+def test_polynomial_pre_curvature_is_the_sum_of_its_terms():
+    segment = Segment(0.2, 1.0, 1.0, (9.9, 3.0 - 20.0j, 500.0j))
+    X = np.linspace(0.0, 0.2, 7)
+    np.testing.assert_allclose(segment.pre_curvature(X), 9.9 + (3.0 - 20.0j) * X + 500.0j * X**2, rtol=1e-15)
+
+
+def test_helical_pre_curvature_turns_at_constant_size():
+    segment = Segment(0.2, 1.0, 1.0, (8.0,), turn=30.0)
+    X = np.linspace(0.0, 0.2, 7)
+    value = segment.pre_curvature(X)
+    np.testing.assert_allclose(value.real, 8.0 * np.cos(30.0 * X), atol=1e-13)
+    np.testing.assert_allclose(value.imag, 8.0 * np.sin(30.0 * X), atol=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("curvature", "turn"),
+    [((), 0.0), ((9.9,), 0.0), ((9.9,), -12.0), ((1.0 + 2.0j, -30.0j, 400.0, 5e3j), 0.0), ((1.0j, 60.0, 7e2), 25.0)],
+)
+def test_pre_curvature_rate_is_the_derivative(curvature, turn):
+    segment = Segment(0.1, 1.0, 1.0, curvature, turn)
+    X = np.linspace(0.01, 0.09, 9)
+    h = 1e-4
+    value = segment.pre_curvature
+    five_point = (value(X - 2 * h) - 8 * value(X - h) + 8 * value(X + h) - value(X + 2 * h)) / (12 * h)
+    np.testing.assert_allclose(segment.pre_curvature_rate(X), five_point, rtol=1e-9, atol=1e-8)
+
+
+@pytest.mark.parametrize("segment", [STRAIGHT, ARC, Segment(0.1, 1.0, 1.0, (1.0, 2.0j), 3.0)])
+@pytest.mark.parametrize("shape", [(), (0,), (4,), (2, 3)])
+def test_pre_curvature_keeps_the_shape(segment, shape):
+    X = np.full(shape, 0.02)
+    for value in (segment.pre_curvature(X), segment.pre_curvature_rate(X)):
+        assert np.shape(value) == shape
+        assert value.dtype == np.complex128
+
+
+@pytest.mark.parametrize(
+    ("given", "kept"),
+    [
+        ((), ()),
+        ([9.9], (9.9 + 0j,)),
+        (np.array([1.0, 2.0j, 0.0, 0.0]), (1.0 + 0j, 2.0j)),
+        ((0.0, 0.0), ()),
+        ((0, 3), (0j, 3 + 0j)),
+    ],
+)
+def test_coefficients_become_complex_and_lose_trailing_zeros(given, kept):
+    segment = Segment(0.1, 1.0, 1.0, given)
+    assert segment.curvature == kept
+    assert all(type(coefficient) is complex for coefficient in segment.curvature)
+    assert segment.is_straight == (kept == ())
+
+
+@pytest.mark.parametrize(
+    ("changes", "field", "shown"),
+    [
+        ({"length": 0.0}, "length", "0.0"),
+        ({"length": -0.1}, "length", "-0.1"),
+        ({"length": 93.5}, "length", "93.5"),  # millimetres
+        ({"length": math.nan}, "length", "nan"),
+        ({"length": math.inf}, "length", "inf"),
+        ({"length": True}, "length", "True"),
+        ({"length": "0.1"}, "length", "'0.1'"),
+        ({"length": None}, "length", "None"),
+        ({"length": 10**400}, "length", "1000"),
+        ({"bending_stiffness": 0.0}, "bending_stiffness", "0.0"),
+        ({"bending_stiffness": -1.0}, "bending_stiffness", "-1.0"),
+        ({"bending_stiffness": 1e308}, "bending_stiffness", "1e+308"),
+        ({"torsional_stiffness": 0.0}, "torsional_stiffness", "0.0"),
+        ({"torsional_stiffness": math.nan}, "torsional_stiffness", "nan"),
+        ({"turn": math.inf}, "turn", "inf"),
+        ({"turn": 1j}, "turn", "1j"),
+        ({"curvature": 9.9}, "curvature", "9.9"),
+        ({"curvature": "9"}, "curvature[0]", "'9'"),
+        ({"curvature": (9.9, None)}, "curvature[1]", "None"),
+        ({"curvature": (True,)}, "curvature[0]", "True"),
+        ({"curvature": (9.9, complex(0, math.nan))}, "curvature[1]", "nanj"),
+        ({"curvature": (complex(1e308, 1e308),)}, "curvature[0]", "1e+308"),
+        ({"curvature": (0.0, 0.0, 1e308)}, "curvature[2]", "1e+308"),
+    ],
+)
+def test_a_segment_refuses(changes, field, shown):
+    arguments = {"length": 0.1, "bending_stiffness": 0.05, "torsional_stiffness": 0.04} | changes
+    with pytest.raises(RobotError) as caught:
+        Segment(**arguments)
+    assert caught.value.field == field
+    assert str(caught.value).startswith(f"{field}: expected ")
+    assert shown in str(caught.value)
+
+
+# --- tubes ------------------------------------------------------------------------------------------------------------
+
+
+def test_breaks_run_from_base_to_tip():
+    tube = Tube("t", (Segment(93.5e-3, 1.0, 1.0), Segment(92.3e-3, 1.0, 1.0), Segment(0.1, 1.0, 1.0)))
+    np.testing.assert_array_equal(tube.breaks, [0.0, 93.5e-3, 93.5e-3 + 92.3e-3, 93.5e-3 + 92.3e-3 + 0.1])
+    assert tube.length == tube.breaks[-1]
+    assert type(tube.length) is float
+
+
+def test_breaks_cannot_be_changed():
+    tube = Tube("t", (STRAIGHT,))
+    with pytest.raises(ValueError, match="read-only"):
+        tube.breaks[0] = 1.0
+
+
+@pytest.mark.parametrize(
+    ("changes", "field"),
+    [
+        ({"name": ""}, "name"),
+        ({"name": "1st"}, "name"),
+        ({"name": "my tube"}, "name"),
+        ({"name": "tube\n"}, "name"),
+        ({"name": "Röhre"}, "name"),
+        ({"name": 3}, "name"),
+        ({"segments": ()}, "segments"),
+        ({"segments": STRAIGHT}, "segments"),
+        ({"segments": (STRAIGHT, 0.1)}, "segments[1]"),
+        ({"inner_diameter": None}, "inner_diameter"),
+        ({"outer_diameter": None}, "outer_diameter"),
+        ({"inner_diameter": -1e-3}, "inner_diameter"),
+        ({"outer_diameter": 1e-3}, "outer_diameter"),  # the bore is 1 mm too
+        ({"outer_diameter": 2.39}, "outer_diameter"),  # millimetres
+        ({"outer_diameter": math.nan}, "outer_diameter"),
+    ],
+)
+def test_a_tube_refuses(changes, field):
+    arguments = {"name": "t", "segments": (STRAIGHT,), "inner_diameter": 1e-3, "outer_diameter": 2e-3} | changes
+    with pytest.raises(RobotError) as caught:
+        Tube(**arguments)
+    assert caught.value.field == field
+
+
+# --- stiffness --------------------------------------------------------------------------------------------------------
+
+
+def test_annulus_stiffness_is_that_of_a_wire_less_its_bore():
+    wire = np.array(annulus_stiffness(58e9, 21.5e9, 0.0, 2.39e-3))
+    bore = np.array(annulus_stiffness(58e9, 21.5e9, 0.0, 2.01e-3))
+    np.testing.assert_allclose(annulus_stiffness(58e9, 21.5e9, 2.01e-3, 2.39e-3), wire - bore, rtol=1e-14)
+    # a wire of radius r: I = pi r^4 / 4, J = pi r^4 / 2
+    radius = 1.195e-3
+    np.testing.assert_allclose(wire, [58e9 * math.pi * radius**4 / 4, 21.5e9 * math.pi * radius**4 / 2], rtol=1e-14)
+
+
+def test_incompressible_material_has_a_third_of_its_youngs_modulus_in_shear():
+    assert shear_modulus_from_poisson(60e9, 0.5) == pytest.approx(20e9, rel=1e-15)
+
+
+# --- robots -----------------------------------------------------------------------------------------------------------
+
+
+def test_a_robot_is_a_value():
+    robot = make_robot()
+    assert robot == make_robot()
+    assert hash(robot) == hash(make_robot())
+    assert pickle.loads(pickle.dumps(robot)) == robot
+    with pytest.raises(FrozenInstanceError):
+        robot.name = "other"
+
+
+def test_lists_are_taken_and_kept_as_tuples():
+    robot = Robot("r", [Tube("t", [STRAIGHT])])
+    assert robot == Robot("r", (Tube("t", (STRAIGHT,)),))
+    assert robot.n_tubes == 1
+
+
+def test_limits_are_completed_to_one_entry_per_tube():
+    assert make_robot().limits == Limits((None, None), (None, None))
+    assert make_robot(Limits(D=[[0, 0.1], None])).limits == Limits((None, None), ((0.0, 0.1), None))
+
+
+WIDE = Tube("wide", (STRAIGHT,), 3e-3, 4e-3)
+NARROW = Tube("narrow", (STRAIGHT,), 0.0, 1e-3)
+UNKNOWN = Tube("unknown", (STRAIGHT,))
+
+
+@pytest.mark.parametrize("tubes", [(WIDE, NARROW), (WIDE, UNKNOWN, NARROW), (UNKNOWN, WIDE)])
+def test_tubes_that_fit(tubes):
+    assert Robot("r", tubes).n_tubes == len(tubes)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "field"),
+    [
+        ({"name": ""}, "name"),
+        ({"name": "two\nlines"}, "name"),
+        ({"name": 7}, "name"),
+        ({"tubes": ()}, "tubes"),
+        ({"tubes": WIDE}, "tubes"),
+        ({"tubes": (WIDE, STRAIGHT)}, "tubes[1]"),
+        ({"tubes": (WIDE, NARROW, Tube("wide", (STRAIGHT,)))}, "tubes[2].name"),
+        ({"tubes": (NARROW, WIDE)}, "tubes[1].outer_diameter"),
+        ({"tubes": (NARROW, UNKNOWN, WIDE)}, "tubes[2].outer_diameter"),  # no bore in between to hide behind
+        ({"limits": None}, "limits"),
+        ({"limits": Limits(alpha=((0.0, 1.0),))}, "limits.alpha"),
+        ({"limits": Limits(alpha=((1.0, 0.0), None))}, "limits.alpha.wide"),
+        ({"limits": Limits(alpha=(None, (0.0, math.inf)))}, "limits.alpha.narrow[1]"),
+        ({"limits": Limits(alpha=(None, (-1e7, 0.0)))}, "limits.alpha.narrow[0]"),
+        ({"limits": Limits(D=(None, 0.1))}, "limits.D.narrow"),
+        ({"limits": Limits(D=(None, (0.0, 0.1, 0.2)))}, "limits.D.narrow"),
+        ({"limits": Limits(D=(None, (0.13, 0.2)))}, "limits.D.narrow"),  # the tube is 0.125 m long
+        ({"limits": Limits(D=(None, (-0.2, -0.1)))}, "limits.D.narrow"),
+        ({"limits": Limits(D=((0.06, 0.1), (0.0, 0.05)))}, "limits.D.narrow"),  # order leaves nothing
+    ],
+)
+def test_a_robot_refuses(arguments, field):
+    with pytest.raises(RobotError) as caught:
+        Robot(**({"name": "r", "tubes": (WIDE, NARROW)} | arguments))
+    assert caught.value.field == field
+
+
+def test_order_can_leave_no_command_because_a_tube_is_short():
+    short = Tube("short", (Segment(0.05, 1.0, 1.0),))
+    with pytest.raises(RobotError, match=r"limits\.D\.short: .* at least 0\.06 m") as caught:
+        Robot("r", (WIDE, short), Limits(D=((0.06, 0.1), None)))
+    assert caught.value.limit.endswith("where the limits of tube 'wide' start")
+
+
+# --- commands ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", [list, tuple, np.array])
+def test_a_good_command_comes_back_as_it_is(kind):
+    alpha, D = make_robot().check_command(kind([-280, 1]), kind([0.0, 0.275]))
+    assert alpha.dtype == D.dtype == np.float64
+    np.testing.assert_array_equal(alpha, [-280.0, 1.0])
+    np.testing.assert_array_equal(D, [0.0, 0.275])
+
+
+def test_a_checked_command_is_a_copy():
+    asked = np.array([0.1, 0.2])
+    alpha, D = make_robot().check_command(asked, asked)
+    alpha[:], D[:] = 7.0, 8.0
+    np.testing.assert_array_equal(asked, [0.1, 0.2])
+
+
+@pytest.mark.parametrize(
+    ("asked", "given"),
+    [
+        ([-5e-13, 0.1], [0.0, 0.1]),
+        ([0.15 + 5e-13, 0.2], [0.15, 0.2]),
+        ([0.1 + 5e-13, 0.1], [0.1 + 5e-13, 0.1 + 5e-13]),
+        ([0.05, 0.275 + 5e-13], [0.05, 0.275]),
+        ([0.15 + 9e-13, 0.15], [0.15, 0.15]),
+    ],
+)
+def test_rounding_errors_in_D_are_absorbed(asked, given):
+    robot = make_robot()
+    _, D = robot.check_command([0.0, 0.0], asked)
+    np.testing.assert_array_equal(D, given)
+    assert 0.0 <= D[0] <= D[1] <= robot.tubes[1].length
+    assert D[0] <= robot.tubes[0].length
+
+
+LIMITED = Limits(alpha=((-3.0, 3.0), None), D=(None, (0.02, 0.2)))
+
+
+@pytest.mark.parametrize(
+    ("alpha", "D", "field", "words"),
+    [
+        ([0.0], [0.0, 0.1], "alpha", ["2 real numbers", "[0.0]"]),
+        ([0.0, 0.0, 0.0], [0.0, 0.1], "alpha", ["2 real numbers"]),
+        ([], [0.0, 0.1], "alpha", ["2 real numbers"]),
+        (0.0, [0.0, 0.1], "alpha", ["2 real numbers"]),
+        ([[0.0, 0.0]], [0.0, 0.1], "alpha", ["2 real numbers"]),
+        ([[0.0], [0.0, 1.0]], [0.0, 0.1], "alpha", ["2 real numbers"]),
+        ([0.0, None], [0.0, 0.1], "alpha", ["2 real numbers", "None"]),
+        (["0", "1"], [0.0, 0.1], "alpha", ["2 real numbers", "'0'"]),
+        ([True, False], [0.0, 0.1], "alpha", ["2 real numbers", "True"]),
+        ([0.0, 1j], [0.0, 0.1], "alpha", ["2 real numbers", "1j"]),
+        ([0.0, 10**400], [0.0, 0.1], "alpha", ["2 real numbers"]),
+        ([0.0, math.nan], [0.0, 0.1], "alpha[1]", ["finite", "'inner'", "nan"]),
+        ([-math.inf, 0.0], [0.0, 0.1], "alpha[0]", ["finite", "'outer'", "-inf"]),
+        ([0.0, 1e308], [0.0, 0.1], "alpha[1]", ["<= 1000000 rad", "'inner'", "1e+308"]),
+        ([3.1, 0.0], [0.0, 0.1], "alpha[0]", ["-3 <= alpha <= 3 rad", "limits", "3.1"]),
+        ([0.0, 0.0], [0.0], "D", ["2 real numbers"]),
+        ([0.0, 0.0], [math.nan, 0.1], "D[0]", ["finite", "'outer'", "nan"]),
+        ([0.0, 0.0], [-0.01, 0.1], "D[0]", ["0 <= D <= 0.15 m", "'outer'", "-0.01"]),
+        ([0.0, 0.0], [0.151, 0.16], "D[0]", ["0 <= D <= 0.15 m", "'outer'", "0.151"]),
+        ([0.0, 0.0], [0.1, 208.5], "D[1]", ["0 <= D <= 0.275 m", "metres", "208.5"]),
+        ([0.0, 0.0], [0.1, 1e308], "D[1]", ["0 <= D <= 0.275 m", "1e+308"]),
+        ([0.0, 0.0], [0.1, 0.21], "D[1]", ["0.02 <= D <= 0.2 m", "limits", "0.21"]),
+        ([0.0, 0.0], [0.0, 0.01], "D[1]", ["0.02 <= D <= 0.2 m", "limits", "0.01"]),
+        ([0.0, 0.0], [0.1, 0.09], "D[1]", ["D >= 0.1 m", "'outer'", "0.09"]),
+        ([0.0, 0.0], [0.1, 0.1 - 1e-11], "D[1]", ["D >= 0.1 m"]),
+    ],
+)
+def test_a_bad_command_is_refused(alpha, D, field, words):
+    with pytest.raises(CommandError) as caught:
+        make_robot(LIMITED).check_command(alpha, D)
+    error = caught.value
+    message = str(error)
+    assert error.field == field
+    assert message.startswith(f"{field}: expected {error.limit}, got ")
+    assert all(word in message for word in words), message
+    assert len(message.splitlines()) == 1
+
+
+def test_an_error_survives_copying_and_pickling():
+    with pytest.raises(CommandError) as caught:
+        make_robot().check_command([0.0, 0.0], [0.1, 0.09])
+    for twin in (copy.copy(caught.value), pickle.loads(pickle.dumps(caught.value))):
+        assert (twin.field, twin.value, str(twin)) == ("D[1]", 0.09, str(caught.value))
+
+
+@pytest.mark.parametrize(
+    ("alpha", "D", "given_alpha", "given_D", "moved"),
+    [
+        ([1.0, 9.0], [0.0, 0.1], [1.0, 9.0], [0.0, 0.1], []),
+        ([9.0, 0.0], [0.0, 0.1], [3.0, 0.0], [0.0, 0.1], ["alpha[0]"]),
+        ([0.0, -1e300], [0.0, 0.1], [0.0, -1e6], [0.0, 0.1], ["alpha[1]"]),
+        ([0.0, 0.0], [-1.0, 1e300], [0.0, 0.0], [0.0, 0.2], ["D[0]", "D[1]"]),
+        ([0.0, 0.0], [0.12, 0.05], [0.0, 0.0], [0.12, 0.12], ["D[1]"]),
+        ([0.0, 0.0], [1.0, 0.0], [0.0, 0.0], [0.15, 0.15], ["D[0]", "D[1]"]),
+        ([0.0, 0.0], [-5e-13, 0.1], [0.0, 0.0], [0.0, 0.1], []),  # rounding is not worth a note
+    ],
+)
+def test_clamping_moves_a_command_into_bounds_and_says_so(alpha, D, given_alpha, given_D, moved):
+    robot = make_robot(LIMITED)
+    clamped_alpha, clamped_D, notes = robot.clamp_command(alpha, D)
+    np.testing.assert_array_equal(clamped_alpha, given_alpha)
+    np.testing.assert_array_equal(clamped_D, given_D)
+    assert [note.split(" ")[0] for note in notes] == moved
+    robot.check_command(clamped_alpha, clamped_D)
+
+
+def test_clamping_keeps_to_limits_that_order_tightens():
+    """Each limit alone would let a tube where its neighbour cannot follow."""
+    tubes = tuple(Tube(name, (Segment(0.3, 1.0, 1.0),)) for name in "abc")
+    robot = Robot("r", tubes, Limits(D=((0.0, 0.3), (0.1, 0.2), (0.0, 0.3))))
+    rng = np.random.default_rng(1)
+    for asked in rng.uniform(-0.1, 0.4, (200, 3)):
+        alpha, D, _ = robot.clamp_command(np.zeros(3), asked)
+        np.testing.assert_array_equal(robot.check_command(alpha, D)[1], D)
+
+
+@pytest.mark.parametrize(("alpha", "D"), [([0.0], [0.0, 0.1]), ([0.0, math.nan], [0.0, 0.1]), ([0.0, 0.0], [0.0, "a"])])
+def test_clamping_does_not_mend_what_is_no_command(alpha, D):
+    with pytest.raises(CommandError):
+        make_robot().clamp_command(alpha, D)
