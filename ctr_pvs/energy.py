@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,11 +37,11 @@ def shared_curvature(bending: Array, moment: ComplexArray) -> ComplexArray:
     return moment.sum(axis=-1) / bending.sum(axis=-1)
 
 
-def bending_density(bending: Array, pre_curvature: ComplexArray, psi: Array) -> Array:
-    """Energy density w [J/m] (...) of tubes that share one curvature; a sum of squares, so nothing cancels."""
-    turn = np.exp(1j * psi)
-    k = shared_curvature(bending, bending * pre_curvature * turn)
-    return 0.5 * np.sum(bending * np.abs(pre_curvature - k[..., None] / turn) ** 2, axis=-1)
+def bending_density(bending: Array, pre_curvature: ComplexArray, psi: Array, k: ComplexArray) -> Array:
+    """Energy density w [J/m] (...) of tubes (..., N) bent to the curvature ``k`` (...) [1/m]; a sum of squares, so
+    nothing cancels."""
+    strain = pre_curvature - np.asarray(k)[..., None] * np.exp(-1j * psi)
+    return 0.5 * np.sum(bending * np.abs(strain) ** 2, axis=-1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,10 +92,16 @@ class TorsionEnergy:
         ends = np.cumsum([0, *(len(node.s) for node in self.nodes)])
         return [slice(a, b) for a, b in itertools.pairwise(ends)]
 
+    @cached_property
     def plain_nodes(self) -> list[SectionNodes]:
         """Gauss points of the sections whose energy does not depend on psi."""
         rule = gauss_legendre(0, PLAIN_NODES)
         return [self._nodes(int(m), rule) for m in np.flatnonzero(~self.materials.coupled)]
+
+    @cached_property
+    def all_nodes(self) -> list[SectionNodes]:
+        """Gauss points of every section, from the orifice on."""
+        return sorted([*self.nodes, *self.plain_nodes], key=lambda node: node.section)
 
     def angles(self, q: Array, alpha: Array) -> Array:
         """psi (G, N) [rad] at the nodes."""
@@ -112,18 +119,12 @@ class TorsionEnergy:
     def value(self, q: Array, alpha: Array) -> float:
         """E [J] up to the constants of ``constant``: the part that depends on q."""
         psi = self.angles(q, alpha)
-        bending = sum(
-            float(node.weight @ bending_density(node.bending, node.kappa, psi[part]))
-            for node, part in zip(self.nodes, self.slices, strict=True)
-        )
+        bending = sum(_relaxed_energy(node, psi[part]) for node, part in zip(self.nodes, self.slices, strict=True))
         return 0.5 * float(q @ q) + bending
 
     def constant(self) -> float:
         """Energy [J] that does not depend on twist: uncoupled sections and straightening in the guide."""
-        plain = sum(
-            float(node.weight @ bending_density(node.bending, node.kappa, np.zeros(node.kappa.shape)))
-            for node in self.plain_nodes()
-        )
+        plain = sum(_relaxed_energy(node, np.zeros(node.kappa.shape)) for node in self.plain_nodes)
         return plain + float(self.materials.straightening_energy.sum())
 
     def gradient(self, q: Array, alpha: Array) -> Array:
@@ -162,3 +163,9 @@ class TorsionEnergy:
         swing = change.sum(axis=1).conj()
         mixed = swing[:, None, :] * here[:, :, None] + total[:, None, None] * change
         return self.coupling[part, None, None] * mixed.imag
+
+
+def _relaxed_energy(node: SectionNodes, psi: Array) -> float:
+    """Bending energy [J] of a section whose curvature is in balance at every point; psi (g, N)."""
+    k = shared_curvature(node.bending, node.bending * node.kappa * np.exp(1j * psi))
+    return float(node.weight @ bending_density(node.bending, node.kappa, psi, k))

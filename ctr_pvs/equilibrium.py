@@ -10,15 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ctr_pvs.actuation import Loads
-from ctr_pvs.actuation import virtual_work_loads
 from ctr_pvs.backbone import Backbone
 from ctr_pvs.backbone import Pose
 from ctr_pvs.backbone import bishop_frames
 from ctr_pvs.backbone import material_poses
-from ctr_pvs.energy import TorsionEnergy
-from ctr_pvs.jacobian import tip_jacobian
 from ctr_pvs.shape import Shape
-from ctr_pvs.stability import stability_margin
+from ctr_pvs.solution import Solution
 from ctr_pvs.status import NoEquilibriumError
 from ctr_pvs.status import Status
 
@@ -49,8 +46,7 @@ class Equilibrium:
     error_estimate: float = np.nan
     residual: float = np.nan
     iterations: int = 0
-    _energy: TorsionEnergy | None = field(default=None, repr=False)
-    _q: Array | None = field(default=None, repr=False)
+    solution: Solution | None = field(default=None, repr=False)
 
     @property
     def success(self) -> bool:
@@ -58,23 +54,18 @@ class Equilibrium:
 
     @property
     def degrees_of_freedom(self) -> int:
-        return self._solved()[0].n
+        return self._solved.degrees_of_freedom
 
-    def solved_state(self) -> tuple[TorsionEnergy, Array, Array]:
-        """The energy that was minimised, alpha (N,) and the unknowns q (n,): what ``Sensitivity`` takes."""
-        energy, q = self._solved()
-        return energy, self.alpha, q
-
-    def _solved(self) -> tuple[TorsionEnergy, Array]:
-        if self._energy is None or self._q is None:
+    @property
+    def _solved(self) -> Solution:
+        if self.solution is None:
             raise NoEquilibriumError(f"no equilibrium to show ({self.status.value}): {self.message}")
-        return self._energy, self._q
+        return self.solution
 
-    @cached_property
+    @property
     def shape(self) -> Shape:
         """Twist and curvature fields."""
-        energy, q = self._solved()
-        return Shape(energy.space, self.alpha, q)
+        return self._solved.shape
 
     @cached_property
     def tip(self) -> Pose:
@@ -95,7 +86,7 @@ class Equilibrium:
 
     def tube_backbone(self, tube: int, n: int) -> Backbone:
         """``n`` >= 2 poses of one tube's material frame from the orifice to its own tip; ``tube`` counts from 0."""
-        end = max(0.0, float(self.shape.space.materials.robot.tubes[tube].length - self.D[tube]))
+        end = max(0.0, float(self.shape.materials.robot.tubes[tube].length - self.D[tube]))
         s = np.linspace(0.0, min(end, self.shape.domain.length), n)
         return material_poses(self.shape, tube, s, bishop_frames(self.shape, s, self.integration_tolerance))
 
@@ -111,7 +102,7 @@ class Equilibrium:
     @cached_property
     def loads(self) -> Loads:
         """Actuation loads by virtual work."""
-        return virtual_work_loads(self._solved()[0], self.shape)
+        return self._solved.loads()
 
     @property
     def torque(self) -> Array:
@@ -136,18 +127,15 @@ class Equilibrium:
     @cached_property
     def energy(self) -> float:
         """Elastic energy [J], straightening in the guide counted."""
-        energy, q = self._solved()
-        return energy.value(q, self.alpha) + energy.constant()
+        return self._solved.elastic_energy()
 
     @cached_property
     def stability_margin(self) -> float:
         """Smallest eigenvalue of the energy Hessian relative to torsional stiffness, clipped at 1; NaN without
         equilibrium."""
-        if self._energy is None or self._q is None:
-            return float("nan")
-        return stability_margin(self._energy, self._q, self.alpha)
+        return float("nan") if self.solution is None else self.solution.stability_margin()
 
     @cached_property
     def jacobian(self) -> Array:
         """(6, 2 N) rates of the tip: position [m] and rotation [rad] in base axes, by alpha [1/rad] then D [1/m]."""
-        return tip_jacobian(self._solved()[0], self.shape, self.integration_tolerance)
+        return self._solved.tip_jacobian(self.integration_tolerance)

@@ -15,12 +15,12 @@ from ctr_pvs.energy import SectionNodes
 from ctr_pvs.energy import TorsionEnergy
 from ctr_pvs.energy import shared_curvature
 from ctr_pvs.sensitivity import Sensitivity
-from ctr_pvs.shape import Shape
+from ctr_pvs.shape import TorsionShape
 
 Array = NDArray[np.float64]
 
 
-def tip_jacobian(energy: TorsionEnergy, shape: Shape, tolerance: float) -> Array:
+def tip_jacobian(energy: TorsionEnergy, shape: TorsionShape, tolerance: float) -> Array:
     """(6, 2 N) rates of the tip: rows position [m] and rotation [rad] in base axes, columns alpha [1/rad] then D [1/m].
 
     Rotation is that of the leading tube's material frame.  At a kink of the energy in D it is the mean of both sides.
@@ -29,7 +29,7 @@ def tip_jacobian(energy: TorsionEnergy, shape: Shape, tolerance: float) -> Array
     none = np.zeros((tubes, tubes))
     directions = np.hstack([np.eye(tubes), none]), np.hstack([none, np.eye(tubes)])
     rates = Sensitivity(energy, shape.alpha, shape.q, *directions)
-    nodes = sorted([*energy.nodes, *energy.plain_nodes()], key=lambda node: node.section)
+    nodes = energy.all_nodes
     places = np.concatenate([np.zeros(1), *(node.s for node in nodes), [shape.domain.length]])
     frames = bishop_frames(shape, places, tolerance)
     tip = frames[-1]
@@ -47,10 +47,10 @@ def tip_jacobian(energy: TorsionEnergy, shape: Shape, tolerance: float) -> Array
     return np.vstack([push, turn + tip[:3, :1] * _leader_turn(shape, rates)])
 
 
-def _strain_rates(node: SectionNodes, shape: Shape, rates: Sensitivity) -> tuple[Array, Array]:
+def _strain_rates(node: SectionNodes, shape: TorsionShape, rates: Sensitivity) -> tuple[Array, Array]:
     """Weighted d(h k) (g, 3, P) in the Bishop frame and dh (P,) of one section."""
     m, x = node.section, node.rule.x
-    materials = shape.space.materials
+    materials = shape.materials
     turned = np.exp(1j * shape.angle(m, x))
     moments = node.bending * node.kappa * turned
     steepness = node.bending * materials.pre_curvature_rate(m, node.s) * turned
@@ -65,7 +65,7 @@ def _strain_rates(node: SectionNodes, shape: Shape, rates: Sensitivity) -> tuple
     return bend, stretch
 
 
-def _leader_turn(shape: Shape, rates: Sensitivity) -> Array:
+def _leader_turn(shape: TorsionShape, rates: Sensitivity) -> Array:
     """(P,) rate of the leading tube's angle at the tip."""
     last = shape.domain.n_sections - 1
     if last < 0:  # nothing is out: no torque, no twist

@@ -1,8 +1,9 @@
-"""The fields of one equilibrium along s: twist angles psi_j, their rates, and the shared curvature."""
+"""The fields of one equilibrium along s, at any model level: twist angles psi_j, their rates, the curvature."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from abc import ABC
+from abc import abstractmethod
 from functools import cached_property
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from ctr_pvs.basis import legendre
 from ctr_pvs.energy import shared_curvature
+from ctr_pvs.materials import Materials
 from ctr_pvs.sections import ABSENT
 from ctr_pvs.sections import Domain
 from ctr_pvs.twist import TorqueField
@@ -19,65 +21,40 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 
-@dataclass(frozen=True, eq=False)
-class Shape:
-    """Fields of the state ``q`` (n,) of ``space`` under base angles ``alpha`` (N,)."""
+class Shape(ABC):
+    """Fields of N tubes over the M sections of a domain, under base angles ``alpha`` (N,) [rad]."""
 
-    space: TwistSpace
-    alpha: Array
-    q: Array
+    def __init__(self, materials: Materials, alpha: Array) -> None:
+        self.materials = materials
+        self.alpha = alpha
 
     @property
     def domain(self) -> Domain:
-        return self.space.materials.domain
+        return self.materials.domain
 
-    @cached_property
-    def torques(self) -> TorqueField:
-        return self.space.field(self.q)
+    @abstractmethod
+    def angle(self, m: int, x: Array) -> Array:
+        """psi (g, N) [rad] at the places ``x`` (g,) in [0, 1] of section m."""
+
+    @abstractmethod
+    def twist_rate(self, m: int, x: Array) -> Array:
+        """psi' (g, N) [rad/m] at the places ``x`` of section m, 0 for absent tubes."""
+
+    @abstractmethod
+    def curvature(self, m: int, x: Array) -> ComplexArray:
+        """k (g,) [1/m] of the backbone, k_y + i k_z in the Bishop frame, at the places ``x`` of section m."""
+
+    @property
+    @abstractmethod
+    def angle_at_boundaries(self) -> Array:
+        """psi (M + 1, N) [rad] at the section boundaries; past its tip a tube keeps its last angle."""
 
     @cached_property
     def leader(self) -> int:
         """The tube that reaches farthest, the innermost of equals: poses carry its material frame."""
-        reach = self.last_segments()
+        # With nothing out, what lies in the guide just behind the orifice.
+        reach = self.domain.segment[-1] if self.domain.n_sections else self.domain.guide_segment
         return int(np.flatnonzero(reach != ABSENT)[-1])
-
-    def last_segments(self) -> NDArray[np.int64]:
-        """(N,) segment of each tube at the robot's far end, or ``ABSENT``; with nothing out, what lies in the guide."""
-        if self.domain.n_sections:
-            return self.domain.segment[-1]
-        return self.domain.guide_segment
-
-    def angle(self, m: int, x: Array) -> Array:
-        """psi (g, N) [rad] at the places ``x`` (g,) in [0, 1] of section m."""
-        psi = np.broadcast_to(self.angle_at_boundaries[m], (len(x), len(self.alpha)))
-        coefficients = self.torques.sections[m]
-        twist = legendre(coefficients.shape[1] - 1, x)[1] @ coefficients.T
-        return psi + twist * self._compliance(m)
-
-    def twist_rate(self, m: int, x: Array) -> Array:
-        """psi' (g, N) [rad/m] at the places ``x`` of section m, 0 for absent tubes."""
-        coefficients = self.torques.sections[m]
-        torque = legendre(coefficients.shape[1] - 1, x)[0] @ coefficients.T
-        return torque * self._compliance(m) / self.domain.lengths[m]
-
-    def _compliance(self, m: int) -> Array:
-        stiffness = self.space.materials.torsional[m]
-        return np.divide(self.domain.lengths[m], stiffness, out=np.zeros_like(stiffness), where=stiffness > 0.0)
-
-    @cached_property
-    def angle_at_boundaries(self) -> Array:
-        """psi (M + 1, N) [rad] at the section boundaries; past its tip a tube keeps its last angle."""
-        psi = [self.alpha + self.space.materials.guide_compliance * self.torques.guide]
-        for m, coefficients in enumerate(self.torques.sections):
-            # Only the constant polynomial has a mean.
-            psi.append(psi[-1] + coefficients[:, 0] * self._compliance(m))
-        return np.array(psi)
-
-    def curvature(self, m: int, x: Array) -> ComplexArray:
-        """k (g,) [1/m] of the backbone, k_y + i k_z in the Bishop frame, at the places ``x`` of section m."""
-        materials = self.space.materials
-        kappa = materials.pre_curvature(m, self.domain.boundaries[m] + x * self.domain.lengths[m])
-        return shared_curvature(materials.bending[m], materials.bending[m] * kappa * np.exp(1j * self.angle(m, x)))
 
     def angles_at(self, s: Array) -> Array:
         """psi (g, N) [rad] at arc lengths ``s`` (g,) [m], NaN where a tube has ended (its tip still counts)."""
@@ -88,7 +65,49 @@ class Shape:
         for m in np.unique(section):
             here = section == m
             x = (s[here] - self.domain.boundaries[m]) / self.domain.lengths[m]
-            psi[here] = np.where(self.domain.segment[m] == ABSENT, np.nan, self.angle(m, x))
+            psi[here] = np.where(self.domain.segment[m] == ABSENT, np.nan, self.angle(int(m), x))
         at_orifice = s <= self.domain.boundaries[0]
         psi[at_orifice] = self.angle_at_boundaries[0]  # a tube that ends on the orifice has an angle there
         return psi
+
+
+class TorsionShape(Shape):
+    """The shape of unknowns ``q`` (n,) at the `torsion` level: curvature follows the twist point by point."""
+
+    def __init__(self, space: TwistSpace, alpha: Array, q: Array) -> None:
+        super().__init__(space.materials, alpha)
+        self.space = space
+        self.q = q
+
+    @cached_property
+    def torques(self) -> TorqueField:
+        """Torque of every tube, to start another solve from."""
+        return self.space.field(self.q)
+
+    def angle(self, m: int, x: Array) -> Array:
+        psi = np.broadcast_to(self.angle_at_boundaries[m], (len(x), len(self.alpha)))
+        coefficients = self.torques.sections[m]
+        twist = legendre(coefficients.shape[1] - 1, x)[1] @ coefficients.T
+        return psi + twist * self._compliance(m)
+
+    def twist_rate(self, m: int, x: Array) -> Array:
+        coefficients = self.torques.sections[m]
+        torque = legendre(coefficients.shape[1] - 1, x)[0] @ coefficients.T
+        return torque * self._compliance(m) / self.domain.lengths[m]
+
+    def curvature(self, m: int, x: Array) -> ComplexArray:
+        kappa = self.materials.pre_curvature(m, self.domain.boundaries[m] + x * self.domain.lengths[m])
+        stiffness = self.materials.bending[m]
+        return shared_curvature(stiffness, stiffness * kappa * np.exp(1j * self.angle(m, x)))
+
+    def _compliance(self, m: int) -> Array:
+        stiffness = self.materials.torsional[m]
+        return np.divide(self.domain.lengths[m], stiffness, out=np.zeros_like(stiffness), where=stiffness > 0.0)
+
+    @cached_property
+    def angle_at_boundaries(self) -> Array:
+        psi = [self.alpha + self.materials.guide_compliance * self.torques.guide]
+        for m, coefficients in enumerate(self.torques.sections):
+            # Only the constant polynomial has a mean.
+            psi.append(psi[-1] + coefficients[:, 0] * self._compliance(m))
+        return np.array(psi)

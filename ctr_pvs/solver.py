@@ -14,14 +14,13 @@ from ctr_pvs.continuation import Followed
 from ctr_pvs.continuation import PathEnd
 from ctr_pvs.continuation import State
 from ctr_pvs.continuation import follow
-from ctr_pvs.energy import TorsionEnergy
 from ctr_pvs.equilibrium import Equilibrium
 from ctr_pvs.errors import FieldError
 from ctr_pvs.models import Models
 from ctr_pvs.relaxed import relaxed_state
 from ctr_pvs.robot import Robot
 from ctr_pvs.shape import Shape
-from ctr_pvs.solve import NewtonResult
+from ctr_pvs.solution import TorsionSolution
 from ctr_pvs.solve import newton
 from ctr_pvs.status import Status
 
@@ -36,10 +35,10 @@ LOOSER = 64.0
 
 @dataclass(frozen=True, eq=False)
 class _Refined:
-    """A state refined at its command: energy, q (n,), the error estimate [m] and whether the branch was kept."""
+    """A state refined at its command, its residual twist [rad], its error estimate [m] and the iterations spent."""
 
-    energy: TorsionEnergy
-    result: NewtonResult
+    solution: TorsionSolution
+    residual: float
     estimate: float
     iterations: int
 
@@ -88,10 +87,7 @@ class EquilibriumSolver:
         origin, note = self._origin(alpha, D, start)
         if origin is None:
             return self._failure(alpha, D, Status.NOT_CONVERGED, note)
-        answer = self._answer(origin, alpha, D, deadline, note)
-        if answer.success:
-            self._last = State(alpha, D, answer.shape.torques)
-        return answer
+        return self._answer(origin, alpha, D, deadline, note)
 
     def _origin(self, alpha: Array, D: Array, start: str) -> tuple[State | None, str]:
         """The state to set out from, and what the user should know about it."""
@@ -120,7 +116,10 @@ class EquilibriumSolver:
                 return self._failure(alpha, D, Status.NO_STABLE_EQUILIBRIUM, _fold_message(followed), iterations)
             refined = self._refine(followed.state, DEGREES[index:])
             if refined is not None:
-                return self._success(alpha, D, refined, iterations + refined.iterations, note)
+                answer = self._success(alpha, D, refined, iterations + refined.iterations, note)
+                if answer.success:
+                    self._last = State(alpha, D, refined.solution.shape.torques)
+                return answer
         message = "the refined model lost the branch that the coarse one followed: a fold is very near this command"
         return self._failure(alpha, D, Status.NOT_CONVERGED, message, iterations)
 
@@ -135,13 +134,13 @@ class EquilibriumSolver:
             iterations += result.iterations
             if not result.converged:
                 return None
-            shape = Shape(energy.space, state.alpha, result.q)
-            torques, before = shape.torques, tip
-            tip = _tip(shape, looseness * 0.1 * self.tolerance)
+            solution = TorsionSolution(energy, state.alpha, result.q)
+            torques, before = solution.shape.torques, tip
+            tip = _tip(solution.shape, looseness * 0.1 * self.tolerance)
             looseness = 1.0
             if before is not None:
                 estimate = float(np.linalg.norm(tip - before))
-                refined = _Refined(energy, result, estimate, iterations)
+                refined = _Refined(solution, result.residual, estimate, iterations)
                 if estimate <= self.tolerance:
                     break
         return refined
@@ -161,10 +160,9 @@ class EquilibriumSolver:
             self.tolerance,
             "torsion",
             refined.estimate,
-            refined.result.residual,
+            refined.residual,
             iterations,
-            refined.energy,
-            refined.result.q,
+            refined.solution,
         )
 
     def _failure(self, alpha: Array, D: Array, status: Status, message: str, iterations: int = 0) -> Equilibrium:

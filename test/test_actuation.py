@@ -77,7 +77,7 @@ def test_sum_rules(seed):
     assert abs(answer.torque.sum()) < 1e-12
     if answer.kink or not answer.shape.domain.n_sections:
         return
-    stiffness = answer.shape.space.materials.bending[0].sum()
+    stiffness = answer.shape.materials.bending[0].sum()
     expected = 0.5 * stiffness * abs(answer.shape.curvature(0, np.zeros(1))[0]) ** 2
     assert answer.force.sum() == pytest.approx(expected, rel=1e-10, abs=1e-10)
 

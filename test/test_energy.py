@@ -99,12 +99,12 @@ def test_sensitivity_of_the_equilibrium(seed):
     assert here.success, here.message
     if here.degrees_of_freedom == 0:
         pytest.skip("nothing can twist in this scene")
-    rates = Sensitivity(*here.solved_state(), alpha_rate[:, None], D_rate[:, None])
+    rates = Sensitivity(here.solution.energy, alpha, here.solution.q, alpha_rate[:, None], D_rate[:, None])
     h, x = 1e-5, np.array([0.2, 0.9])
     ahead, behind = (solver.solve(alpha + s * h * alpha_rate, D + s * h * D_rate) for s in (1, -1))
     if {here.shape.domain.topology} != {a.shape.domain.topology for a in (ahead, behind)}:
         pytest.skip("the difference would cross a kink")
     for m in range(here.shape.domain.n_sections):
         difference = (ahead.shape.angle(m, x) - behind.shape.angle(m, x)) / (2 * h)
-        present = here.shape.space.materials.bending[m] > 0
+        present = here.shape.materials.bending[m] > 0
         assert rates.angle_rate(m, x)[:, present, 0] == pytest.approx(difference[:, present], rel=1e-5, abs=1e-6)

@@ -132,7 +132,7 @@ def test_same_history_gives_the_same_bits(seed_robot):
 
 def test_the_residual_is_that_of_the_answer(seed_robot):
     answer = EquilibriumSolver(seed_robot).solve([0.0, 2.0], [0.0935, 0.2085])
-    energy, q = answer._solved()
+    energy, q = answer.solution.energy, answer.solution.q
     again = np.abs(energy.angle_map @ energy.gradient(q, answer.alpha)).max()
     assert answer.residual == again < 1e-11
 
