@@ -18,9 +18,9 @@ run: setup ## serve equilibria until Ctrl-C; another robot: make run ROBOT=path.
 	@$(IN_ENV) equilibrium_node --ros-args --params-file config/equilibrium_node.yaml -p robot_file:=$(ROBOT)
 
 lint: setup ## style, format and types
-	@$(IN_ENV) ruff check .
-	@$(IN_ENV) ruff format --check .
-	@$(IN_ENV) mypy
+	@$(IN_ENV) python3 -m ruff check .
+	@$(IN_ENV) python3 -m ruff format --check .
+	@$(IN_ENV) python3 -m mypy
 
 test: lint ## lint, solver tests and node tests
 	@$(IN_ENV) python3 -m pytest

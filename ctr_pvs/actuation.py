@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from ctr_pvs.energy import SectionNodes
 from ctr_pvs.energy import bending_density
 from ctr_pvs.energy import shared_curvature
+from ctr_pvs.robot import Segment
 from ctr_pvs.sections import ABSENT
 from ctr_pvs.sections import Event
 from ctr_pvs.shape import Shape
@@ -164,7 +165,7 @@ def _thin_section(shape: Shape, rates: _SectionRates, index: int, segments: NDAr
         start = robot.tubes[tube].breaks[segments[tube]]
         bending[tube] = segment.bending_stiffness
         kappa[tube] = segment.pre_curvature(np.array(domain.boundaries[index] + domain.D[tube] - start))
-        twisting += 0.5 * float(rates.torque[index, tube]) ** 2 / segment.torsional_stiffness
+        twisting += _twisting(shape, float(rates.torque[index, tube]), segment)
     if not bending.any():
         return 0.0
     k = shared_curvature(bending, bending * kappa * np.exp(1j * psi))
@@ -185,4 +186,9 @@ def _guide_force(shape: Shape, rates: _SectionRates, tube: int, side: int) -> fl
     segment = material.segments[index]
     kappa = segment.pre_curvature(np.array(base - material.breaks[index]))
     straightening = 0.5 * segment.bending_stiffness * float(np.abs(kappa)) ** 2
-    return straightening - 0.5 * float(rates.torque[0, tube]) ** 2 / segment.torsional_stiffness
+    return straightening - _twisting(shape, float(rates.torque[0, tube]), segment)
+
+
+def _twisting(shape: Shape, torque: float, segment: Segment) -> float:
+    """Work per length [N] that a constant torque does in twisting a segment beyond its stored energy."""
+    return 0.5 * torque**2 / segment.torsional_stiffness if shape.twists else 0.0

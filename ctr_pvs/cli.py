@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import os
 import sys
 from collections.abc import Callable
 from collections.abc import Sequence
@@ -51,10 +52,15 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         arguments = _parser().parse_args(_shielded(words))
         run: Callable[[argparse.Namespace], int] = arguments.run
-        return run(arguments)
+        code = run(arguments)
+        sys.stdout.flush()  # here, where a closed pipe can still be answered
+        return code
     except (UsageError, FieldError, RobotFileError) as error:
         print("ctr-pvs:", " ".join(str(error).splitlines()), file=sys.stderr)
         return BAD_INPUT
+    except BrokenPipeError:  # whoever read the answer has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return SUCCESS
 
 
 def _declare_solve(subcommands: argparse._SubParsersAction[_Parser]) -> None:

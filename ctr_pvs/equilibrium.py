@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from dataclasses import field
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -14,6 +15,7 @@ from ctr_pvs.backbone import Backbone
 from ctr_pvs.backbone import Pose
 from ctr_pvs.backbone import bishop_frames
 from ctr_pvs.backbone import material_poses
+from ctr_pvs.renda2021 import printed_forces
 from ctr_pvs.shape import Shape
 from ctr_pvs.solution import Solution
 from ctr_pvs.status import NoEquilibriumError
@@ -43,6 +45,7 @@ class Equilibrium:
     message: str
     tolerance: float
     fidelity: str
+    force_model: str = "virtual_work"
     error_estimate: float = np.nan
     residual: float = np.nan
     iterations: int = 0
@@ -101,8 +104,13 @@ class Equilibrium:
 
     @cached_property
     def loads(self) -> Loads:
-        """Actuation loads by virtual work."""
-        return self._solved.loads()
+        """Actuation loads: by virtual work, or with the forces of eq. (41) where that force model was asked for."""
+        loads = self._solved.loads()
+        if self.force_model == "renda2021":
+            # By eq. (42) the seed's forces point along +x; on the +D axis they are the negatives.
+            force = -printed_forces(self.shape)
+            loads = replace(loads, force=force, force_interval=np.column_stack([force, force]))
+        return loads
 
     @property
     def torque(self) -> Array:

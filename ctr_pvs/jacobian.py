@@ -28,7 +28,7 @@ def tip_jacobian(energy: TorsionEnergy, shape: TorsionShape, tolerance: float) -
     tubes = len(shape.alpha)
     none = np.zeros((tubes, tubes))
     directions = np.hstack([np.eye(tubes), none]), np.hstack([none, np.eye(tubes)])
-    rates = Sensitivity(energy, shape.alpha, shape.q, *directions)
+    rates = Sensitivity(energy, shape.alpha, shape.q, *directions, twists=shape.twists)
     nodes = energy.all_nodes
     places = np.concatenate([np.zeros(1), *(node.s for node in nodes), [shape.domain.length]])
     frames = bishop_frames(shape, places, tolerance)

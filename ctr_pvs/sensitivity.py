@@ -54,16 +54,18 @@ def guide_compliance_rate(energy: TorsionEnergy, D_rate: Array) -> Array:
 class Sensitivity:
     """Rates of the equilibrium q of ``energy`` at ``alpha`` along P directions ``alpha_rate``, ``D_rate`` (N, P).
 
-    field : per direction the rate of the torque field; angle_rate (G, N, P) d psi at the nodes' own x.
+    twists : false for tubes that are taken for rigid in torsion: then only the explicit part is left.
     """
 
-    def __init__(self, energy: TorsionEnergy, alpha: Array, q: Array, alpha_rate: Array, D_rate: Array) -> None:
+    def __init__(
+        self, energy: TorsionEnergy, alpha: Array, q: Array, alpha_rate: Array, D_rate: Array, twists: bool = True
+    ) -> None:
         self.energy, self.q = energy, q
         self.alpha_rate = alpha_rate
         self.torques = energy.space.field(q)
         self.domain = domain_rate(energy, D_rate)
         self.guide_rate = guide_compliance_rate(energy, D_rate)
-        self.q_rate = self._implicit(alpha)
+        self.q_rate = self._implicit(alpha) if twists else np.zeros((energy.n, alpha_rate.shape[1]))
 
     def _implicit(self, alpha: Array) -> Array:
         """(n, P) rate of q at fixed scale: what the torques answer to the explicit changes."""

@@ -22,7 +22,12 @@ ComplexArray = NDArray[np.complex128]
 
 
 class Shape(ABC):
-    """Fields of N tubes over the M sections of a domain, under base angles ``alpha`` (N,) [rad]."""
+    """Fields of N tubes over the M sections of a domain, under base angles ``alpha`` (N,) [rad].
+
+    twists : false if tubes are taken for rigid in torsion, so that their torques do no work.
+    """
+
+    twists = True
 
     def __init__(self, materials: Materials, alpha: Array) -> None:
         self.materials = materials
@@ -111,3 +116,9 @@ class TorsionShape(Shape):
             # Only the constant polynomial has a mean.
             psi.append(psi[-1] + coefficients[:, 0] * self._compliance(m))
         return np.array(psi)
+
+
+class TorsionlessShape(TorsionShape):
+    """The shape of tubes that are taken for rigid in torsion: angles are the base angles everywhere."""
+
+    twists = False

@@ -13,6 +13,7 @@ from ctr_pvs.actuation import virtual_work_loads
 from ctr_pvs.energy import TorsionEnergy
 from ctr_pvs.jacobian import tip_jacobian
 from ctr_pvs.shape import Shape
+from ctr_pvs.shape import TorsionlessShape
 from ctr_pvs.shape import TorsionShape
 from ctr_pvs.stability import stability_margin
 
@@ -70,3 +71,15 @@ class TorsionSolution(Solution):
 
     def tip_jacobian(self, tolerance: float) -> Array:
         return tip_jacobian(self.energy, self.shape, tolerance)
+
+
+class TorsionlessSolution(TorsionSolution):
+    """No twist anywhere: eq. (28)-(31).  The margin is that of the twist it neglects."""
+
+    def __init__(self, energy: TorsionEnergy, alpha: Array) -> None:
+        super().__init__(energy, alpha, np.zeros(energy.n))
+        self.shape = TorsionlessShape(energy.space, alpha, self.q)
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        return 0

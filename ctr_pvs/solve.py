@@ -58,8 +58,10 @@ def residual_limit(alpha: Array) -> float:
     return RESIDUAL_TWIST + 64.0 * np.finfo(float).eps * float(np.abs(alpha).max(initial=0.0))
 
 
-def newton(energy: TorsionEnergy, alpha: Array, q: Array) -> NewtonResult:
+def newton(energy: TorsionEnergy, alpha: Array, q: Array, steps: int = MAX_ITERATIONS) -> NewtonResult:
     """Newton from ``q`` (n,), kept to the basin it starts in: it stops rather than take a longer second step.
+
+    steps : the most Newton steps to take; when they are spent before convergence, the result has not converged.
 
     The result's residual is what the unbalanced torque would twist the tubes against their torsional stiffness alone.
     """
@@ -67,7 +69,7 @@ def newton(energy: TorsionEnergy, alpha: Array, q: Array) -> NewtonResult:
         return NewtonResult(NewtonEnd.CONVERGED, q, 0.0, 0, 0.0)
     limit = residual_limit(alpha)
     first = previous = np.inf
-    for iteration in range(1, MAX_ITERATIONS + 1):
+    for iteration in range(1, steps + 1):
         gradient, hessian = energy.derivatives(q, alpha)
         try:
             step = -cho_solve(cho_factor(hessian, check_finite=False), gradient, check_finite=False)
@@ -85,4 +87,4 @@ def newton(energy: TorsionEnergy, alpha: Array, q: Array) -> NewtonResult:
             if residual <= limit:
                 return NewtonResult(NewtonEnd.CONVERGED, q, residual, iteration, first)
     residual = twist_size(energy, energy.gradient(q, alpha))
-    return NewtonResult(NewtonEnd.NOT_CONTRACTING, q, residual, MAX_ITERATIONS, first)
+    return NewtonResult(NewtonEnd.NOT_CONTRACTING, q, residual, steps, first)

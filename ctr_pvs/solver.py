@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 from numpy.typing import NDArray
 
-from ctr_pvs.backbone import bishop_frames
 from ctr_pvs.continuation import Followed
 from ctr_pvs.continuation import PathEnd
 from ctr_pvs.continuation import State
@@ -17,49 +15,45 @@ from ctr_pvs.continuation import follow
 from ctr_pvs.equilibrium import Equilibrium
 from ctr_pvs.errors import FieldError
 from ctr_pvs.models import Models
+from ctr_pvs.refine import DEGREES
+from ctr_pvs.refine import Refined
+from ctr_pvs.refine import refine_full
+from ctr_pvs.refine import refine_torsion
+from ctr_pvs.refine import torsionless
 from ctr_pvs.relaxed import relaxed_state
+from ctr_pvs.renda2021 import check_renda2021
 from ctr_pvs.robot import Robot
-from ctr_pvs.shape import Shape
 from ctr_pvs.solution import TorsionSolution
-from ctr_pvs.solve import newton
 from ctr_pvs.status import Status
 
 Array = NDArray[np.float64]
 
-#: Polynomial degrees of the twist rates, tried in turn until two successive tips agree within the tolerance.
-DEGREES = (5, 7, 9, 12, 16, 21, 28)
-#: The ladder's first rung integrates with steps this much looser, so that the comparison sees the integration error
-#: too.
-LOOSER = 64.0
-
-
-@dataclass(frozen=True, eq=False)
-class _Refined:
-    """A state refined at its command, its residual twist [rad], its error estimate [m] and the iterations spent."""
-
-    solution: TorsionSolution
-    residual: float
-    estimate: float
-    iterations: int
+FIDELITIES = ("auto", "torsionless", "torsion", "full")
+FORCE_MODELS = ("virtual_work", "renda2021")
 
 
 class EquilibriumSolver:
     """Solves commands of one robot one after the other and keeps the last good answer as the next warm start.
 
     tolerance : tip error [m] that an answer may have.
-    fidelity : "auto" or "torsion".
-    force_model : "virtual_work".
+    fidelity : "torsionless" (eq. (28)-(31), closed form), "torsion", "full" (the seed's PVS, all strains free), or
+        "auto": torsion, which without external loads is the limit of "full".
+    force_model : "virtual_work" (dE/dD), or "renda2021": eq. (41) on the +D axis, for two tubes.
     """
 
     def __init__(
         self, robot: Robot, tolerance: float = 1e-5, fidelity: str = "auto", force_model: str = "virtual_work"
     ) -> None:
-        _check_option("fidelity", fidelity, ("auto", "torsion"))
-        _check_option("force_model", force_model, ("virtual_work",))
+        _check_option("fidelity", fidelity, FIDELITIES)
+        _check_option("force_model", force_model, FORCE_MODELS)
+        if force_model == "renda2021":
+            check_renda2021(robot)
         if not 1e-10 <= tolerance <= 1.0:
             raise FieldError("tolerance", tolerance, "a length from 1e-10 to 1 m")
         self.robot = robot
         self.tolerance = float(tolerance)
+        self.force_model = force_model
+        self._level = "torsion" if fidelity == "auto" else fidelity
         self._models = Models(robot)
         self._last: State | None = None
 
@@ -83,6 +77,8 @@ class EquilibriumSolver:
         if budget is not None and not budget > 0.0:
             raise FieldError("budget", budget, "seconds above 0, or None")
         alpha, D = self.robot.check_command(alpha, D)
+        if self._level == "torsionless":
+            return self._torsionless(alpha, D)
         deadline = np.inf if budget is None else time.monotonic() + budget
         origin, note = self._origin(alpha, D, start)
         if origin is None:
@@ -114,51 +110,48 @@ class EquilibriumSolver:
                 )
             if followed.end is PathEnd.FOLD:
                 return self._failure(alpha, D, Status.NO_STABLE_EQUILIBRIUM, _fold_message(followed), iterations)
-            refined = self._refine(followed.state, DEGREES[index:])
+            refined = refine_torsion(self._models, followed.state, DEGREES[index:], self.tolerance)
             if refined is not None:
-                answer = self._success(alpha, D, refined, iterations + refined.iterations, note)
-                if answer.success:
-                    self._last = State(alpha, D, refined.solution.shape.torques)
-                return answer
+                return self._keep(refined, iterations, note)
         message = "the refined model lost the branch that the coarse one followed: a fold is very near this command"
         return self._failure(alpha, D, Status.NOT_CONVERGED, message, iterations)
 
-    def _refine(self, state: State, degrees: tuple[int, ...]) -> _Refined | None:
-        """Raise the degree until successive tips agree; None if a higher degree has no equilibrium next to the lower
-        one's."""
-        torques, tip, iterations, refined = state.torques, None, 0, None
-        looseness = LOOSER
-        for degree in degrees:
-            energy = self._models.energy(state.D, degree)
-            result = newton(energy, state.alpha, energy.space.coordinates(torques))
-            iterations += result.iterations
-            if not result.converged:
-                return None
-            solution = TorsionSolution(energy, state.alpha, result.q)
-            torques, before = solution.shape.torques, tip
-            tip = _tip(solution.shape, looseness * 0.1 * self.tolerance)
-            looseness = 1.0
-            if before is not None:
-                estimate = float(np.linalg.norm(tip - before))
-                refined = _Refined(solution, result.residual, estimate, iterations)
-                if estimate <= self.tolerance:
-                    break
-        return refined
+    def _keep(self, refined: Refined, iterations: int, note: str) -> Equilibrium:
+        """The answer of the level that was asked for; a good one is kept as the next warm start."""
+        torsion = refined.solution
+        assert isinstance(torsion, TorsionSolution)
+        iterations += refined.iterations
+        alpha, D = torsion.alpha, torsion.energy.materials.domain.D
+        if self._level == "full":
+            full = refine_full(self._models, torsion, self.tolerance)
+            if full is None:
+                message = "Newton at the full level does not converge from the torsion equilibrium"
+                return self._failure(alpha, D, Status.NOT_CONVERGED, message, iterations)
+            refined, iterations = full, iterations + full.iterations
+        answer = self._success(alpha, D, refined, iterations, note)
+        if answer.success:
+            # Tubes that are not coupled remember nothing: what follows sets out from the relaxed robot.
+            self._last = State(alpha, D, torsion.shape.torques) if torsion.degrees_of_freedom else None
+        return answer
 
-    def _success(self, alpha: Array, D: Array, refined: _Refined, iterations: int, note: str) -> Equilibrium:
+    def _torsionless(self, alpha: Array, D: Array) -> Equilibrium:
+        """The closed form, with what it neglects told by its error estimate."""
+        return self._success(alpha, D, torsionless(self._models, alpha, D, self.tolerance), 0, "; twist is neglected")
+
+    def _success(self, alpha: Array, D: Array, refined: Refined, iterations: int, note: str) -> Equilibrium:
         status, message = Status.OK, "stable equilibrium" + note
         if refined.estimate > self.tolerance:
             status = Status.TOLERANCE_MISSED
-            message = (
-                f"tip error about {refined.estimate:.1e} m with the largest basis, tolerance {self.tolerance:.1e} m"
-            )
+            needed = f"{self.tolerance:.1e} m were asked for"
+            message = f"tip error about {refined.estimate:.1e} m at the {self._level} level, {needed}"
         return Equilibrium(
             alpha,
             D,
             status,
             message,
             self.tolerance,
-            "torsion",
+            self._level,
+            self.force_model,
             refined.estimate,
             refined.residual,
             iterations,
@@ -166,12 +159,9 @@ class EquilibriumSolver:
         )
 
     def _failure(self, alpha: Array, D: Array, status: Status, message: str, iterations: int = 0) -> Equilibrium:
-        return Equilibrium(alpha, D, status, message, self.tolerance, "torsion", iterations=iterations)
-
-
-def _tip(shape: Shape, tolerance: float) -> Array:
-    """Tip position (3,) [m]."""
-    return bishop_frames(shape, np.array([0.0, shape.domain.length]), tolerance)[-1][:3, 3]
+        return Equilibrium(
+            alpha, D, status, message, self.tolerance, self._level, self.force_model, iterations=iterations
+        )
 
 
 def _fold_message(followed: Followed) -> str:

@@ -28,8 +28,8 @@ class Report:
         self._answer: Answer | None = None
         self._last_rejection = ""
         self._last_clamp = ""
-        self._news: list[str] = []  # rejections and clampings since the last status
-        self._received: float | None = None
+        self._news = ""  # the last thing to warn of since the last status, even if all went well after it
+        self._received = time.monotonic()  # of the last command; until there is one, start-up
         self._header_age = float("nan")
 
     def received(self, header_age: float | None) -> None:
@@ -43,7 +43,7 @@ class Report:
         self._counts["rejected"] += 1
         self._reasons[rejection.reason.value] += 1
         self._last_rejection = f"{rejection.reason.value}: {rejection}"
-        self._news.append(f"command rejected: {self._last_rejection}")
+        self._news = f"command rejected: {self._last_rejection}"
 
     def answered(self, command: Command, answer: Answer) -> None:
         """The command was accepted and solved."""
@@ -52,15 +52,17 @@ class Report:
         self._counts["accepted"] += 1
         self._counts["published"] += answer.verdict.publish
         self._counts["snaps"] += answer.equilibrium.status is Status.SNAP
+        if answer.verdict.remark:
+            self._news = answer.verdict.remark
         if command.notes:
             self._counts["clamped"] += 1
             self._last_clamp = "; ".join(command.notes)
-            self._news.append(f"command clamped: {self._last_clamp}")
+            self._news = f"command clamped: {self._last_clamp}"
 
     def status(self, name: str, hardware_id: str, command_timeout: float) -> DiagnosticStatus:
-        """The state since start-up; rejections and clampings warn once, in the first status after them."""
+        """The state since start-up; what is over by now warns once, in the first status after it."""
         level, message = self._summary(command_timeout)
-        self._news.clear()
+        self._news = ""
         values = self._count_values() | self._answer_values()
         return DiagnosticStatus(
             level=level,
@@ -71,20 +73,19 @@ class Report:
         )
 
     def _summary(self, command_timeout: float) -> tuple[bytes, str]:
-        news = self._news[-1] if self._news else ""
         if self._answer is not None and not self._answer.verdict.publish:
             return DiagnosticStatus.ERROR, self._answer.verdict.remark
         age = self._age()
         if command_timeout > 0.0 and age > command_timeout:
             return DiagnosticStatus.STALE, f"no command for {age:.1f} s (command_timeout is {command_timeout:g} s)"
-        remark = news or (self._answer.verdict.remark if self._answer is not None else "")
+        remark = self._news or (self._answer.verdict.remark if self._answer is not None else "")
         if remark:
             return DiagnosticStatus.WARN, remark
         return DiagnosticStatus.OK, "waiting for the first command" if self._answer is None else "ok"
 
     def _age(self) -> float:
-        """Time since the last command came, s; infinite before the first."""
-        return float("inf") if self._received is None else time.monotonic() - self._received
+        """Time without a command, s."""
+        return time.monotonic() - self._received
 
     def _count_values(self) -> dict[str, str]:
         counts = self._counts
@@ -98,7 +99,7 @@ class Report:
             "last clamping": self._last_clamp,
             "snaps": str(counts["snaps"]),
             "commands with zero stamp (receipt time used)": str(counts["zero_stamps"]),
-            "time since last command [s]": f"{self._age():.3f}",
+            "time without a command [s]": f"{self._age():.3f}",
             "last command's stamp age at receipt [s]": f"{self._header_age:.6f}",
         }
 

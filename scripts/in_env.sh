@@ -6,4 +6,6 @@ source "$(dirname "${BASH_SOURCE[0]}")/ros_env.sh"
 
 enter_venv "$(ros_source)"
 enter_workspace
+# The solver's matrices are small: threads of the linear algebra library only get in each other's way.
+export OPENBLAS_NUM_THREADS=${OPENBLAS_NUM_THREADS:-1}
 exec "$@"

@@ -173,6 +173,15 @@ def test_a_bad_command_changes_nothing(seed_robot):
     assert solver.solve([0.0, np.radians(241)], D).iterations <= 8
 
 
+def test_uncoupled_tubes_forget():
+    """With a tube inside there is no history: a huge angle commanded there does not stay in the way afterwards."""
+    segment = Segment(0.1, 0.05, 0.04, (10.0,))
+    solver = EquilibriumSolver(Robot("pair", (Tube("a", (segment,)), Tube("b", (segment,)))), tolerance=1e-8)
+    assert solver.solve([0.0, 1e5], [0.1, 0.1]).success
+    again = solver.solve([0.0, 1.0], [0.02, 0.03])
+    assert again.success and again.iterations < 40
+
+
 def test_everything_retracted_and_single_tubes():
     """Nothing out: the tip is the orifice.  One tube: no unknowns, exactly its own shape."""
     segment = Segment(0.1, 0.05, 0.04, (10.0,))

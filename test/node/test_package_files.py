@@ -47,7 +47,7 @@ def test_the_launch_file_starts_the_node_with_declared_parameters_only():
     assert node.get("pkg") == "ctr_pvs"
     assert node.get("exec") in entry_points()
     assert node.get("name") == "ctr_equilibrium"
-    names = {element.get("name") for tag in ("param", "set_parameter") for element in launch.iter(tag)}
+    names = {element.get("name") for element in launch.iter("param")}
     assert names - {None} <= declared_parameters() | {"use_sim_time"}
 
 

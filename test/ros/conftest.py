@@ -10,8 +10,16 @@ from typing import Any
 
 import pytest
 
-HAVE_ROS = all(find_spec(package) for package in ("rclpy", "ctr_pvs_interfaces.srv"))
 START_TIMEOUT = 20.0  # s
+
+
+def _installed(package: str) -> bool:
+    """Whether it can be imported; a mere folder of that name, such as the one at the root, does not count."""
+    spec = find_spec(package)
+    return spec is not None and spec.origin is not None
+
+
+HAVE_ROS = _installed("rclpy") and _installed("ctr_pvs_interfaces")
 
 if HAVE_ROS:
     import rclpy

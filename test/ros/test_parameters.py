@@ -81,7 +81,7 @@ def test_a_nameless_command_is_taken_in_order(lenient):
 
 def test_a_command_that_stays_away_is_stale(lenient):
     lenient.client.command(GOOD, TIMEOUT)
-    status, _ = lenient.diagnostics(lambda values: float(values["time since last command [s]"]) > 1.5)
+    status, _ = lenient.diagnostics(lambda values: float(values["time without a command [s]"]) > 1.5)
     assert status.level == DiagnosticStatus.STALE
     assert "command_timeout" in status.message
 

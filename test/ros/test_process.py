@@ -6,11 +6,13 @@ import time
 
 import pytest
 import yaml
+from sensor_msgs.msg import JointState
 
 from ctr_pvs_ros.process import NodeProcess
 from ctr_pvs_ros.process import share_file
 
 ROBOT = share_file("config", "renda2021.yaml")
+JOINTS = ["outer_rotation", "outer_translation", "inner_rotation", "inner_translation"]
 LIMIT = 2.0  # s, to refuse a start and to end after a signal
 
 
@@ -64,8 +66,13 @@ def test_a_wrong_parameter_ends_start_up_with_the_reason(graph, tmp_path, parame
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_the_node_cleanly(start_node, number):
-    peer = start_node(f"/ends_on_{number.name.lower()}")
+@pytest.mark.parametrize("work", ["idle", "solving"])
+def test_a_signal_ends_the_node_cleanly(start_node, number, work):
+    peer = start_node(f"/ends_{work}_on_{number.name.lower()}", compute_budget="60.0")
+    if work == "solving":
+        # So many turns that following them takes longer than this test.
+        peer.send(JointState(name=JOINTS, position=[0.0, 0.0935, 1e6, 0.2085]))
+        time.sleep(0.5)
     began = time.monotonic()
     assert peer.process.stop(number) == 0
     assert time.monotonic() - began < LIMIT

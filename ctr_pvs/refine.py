@@ -1,0 +1,126 @@
+"""From a state on the right branch to an answer within tolerance, at the model level that was asked for.
+
+Each level raises its polynomial degree until two successive tips agree.  The first rung integrates the backbone with
+looser steps, so that the comparison sees the integration error too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ctr_pvs.backbone import bishop_frames
+from ctr_pvs.continuation import State
+from ctr_pvs.full import FullEnergy
+from ctr_pvs.full_solution import FullSolution
+from ctr_pvs.full_solution import solve_full
+from ctr_pvs.models import Models
+from ctr_pvs.shape import Shape
+from ctr_pvs.solution import Solution
+from ctr_pvs.solution import TorsionlessSolution
+from ctr_pvs.solution import TorsionSolution
+from ctr_pvs.solve import newton
+from ctr_pvs.strain_basis import PolynomialBasis
+
+Array = NDArray[np.float64]
+
+#: Polynomial degrees of the twist rates, tried in turn.
+DEGREES = (5, 7, 9, 12, 16, 21, 28)
+#: Polynomial degrees of all strains at the `full` level.
+FULL_DEGREES = (2, 4, 6, 9, 12, 16, 20)
+#: Share of the tolerance that integrating the backbone may use, and how much looser the first rung is.
+INTEGRATION_SHARE = 0.1
+LOOSER = 64.0
+
+
+@dataclass(frozen=True, eq=False)
+class Refined:
+    """A state with its residual twist [rad], its error estimate [m] and the Newton iterations spent."""
+
+    solution: Solution
+    residual: float
+    estimate: float
+    iterations: int
+
+
+@dataclass(frozen=True, eq=False)
+class _Rung:
+    solution: Solution
+    residual: float
+    iterations: int
+
+
+def refine_torsion(models: Models, state: State, degrees: tuple[int, ...], tolerance: float) -> Refined | None:
+    """The `torsion` level; None if a higher degree has no stable equilibrium next to the lower one's."""
+    return _climb(_torsion_rungs(models, state, degrees), tolerance)
+
+
+def refine_full(models: Models, start: TorsionSolution, tolerance: float) -> Refined | None:
+    """The `full` level with Legendre bases, from the `torsion` equilibrium that it converges to."""
+    return _climb(_full_rungs(models, start), tolerance)
+
+
+def torsionless(models: Models, alpha: Array, D: Array, tolerance: float) -> Refined:
+    """Eq. (28)-(31): no twist, closed form.  The estimate is the tip motion of one Newton step of the twist it
+    neglects, infinite where twist would not come back at all."""
+    energy = models.energy(D, DEGREES[0])
+    untwisted = np.zeros(energy.n)
+    solution = TorsionlessSolution(energy, alpha)
+    step = newton(energy, alpha, untwisted, steps=1)
+    if not step.iterations and energy.n:
+        return Refined(solution, step.residual, np.inf, 0)
+    fine = INTEGRATION_SHARE * tolerance
+    twisted = TorsionSolution(energy, alpha, step.q).shape
+    estimate = np.linalg.norm(tip_position(twisted, fine) - tip_position(solution.shape, LOOSER * fine))
+    return Refined(solution, step.residual, float(estimate), 0)
+
+
+def _climb(rungs: Iterator[_Rung | None], tolerance: float) -> Refined | None:
+    tip, iterations, refined = None, 0, None
+    integration = LOOSER * INTEGRATION_SHARE * tolerance
+    for rung in rungs:
+        if rung is None:
+            return None
+        iterations += rung.iterations
+        before, tip = tip, tip_position(rung.solution.shape, integration)
+        integration = INTEGRATION_SHARE * tolerance
+        if before is not None:
+            estimate = float(np.linalg.norm(tip - before))
+            refined = Refined(rung.solution, rung.residual, estimate, iterations)
+            if estimate <= tolerance:
+                break
+    return refined
+
+
+def _torsion_rungs(models: Models, state: State, degrees: tuple[int, ...]) -> Iterator[_Rung | None]:
+    torques = state.torques
+    for degree in degrees:
+        energy = models.energy(state.D, degree)
+        result = newton(energy, state.alpha, energy.space.coordinates(torques))
+        if not result.converged:
+            yield None
+            return
+        solution = TorsionSolution(energy, state.alpha, result.q)
+        torques = solution.shape.torques
+        yield _Rung(solution, result.residual, result.iterations)
+
+
+def _full_rungs(models: Models, start: TorsionSolution) -> Iterator[_Rung | None]:
+    shape: Shape = start.shape
+    for degree in FULL_DEGREES:
+        energy = FullEnergy(start.energy.materials, start.alpha, PolynomialBasis(degree), nodes=degree + 6)
+        result = solve_full(energy, energy.project(shape))
+        if not result.converged:
+            yield None
+            return
+        yield _Rung(FullSolution(energy, result.q, start), result.residual, result.iterations)
+
+
+def tip_position(shape: Shape, tolerance: float) -> Array:
+    """Tip (3,) [m], integrated with steps for ``tolerance`` [m]."""
+    frames = bishop_frames(shape, np.array([0.0, shape.domain.length]), tolerance)
+    tip: Array = frames[-1][:3, 3]
+    return tip
