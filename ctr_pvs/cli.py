@@ -12,6 +12,7 @@ import os
 import sys
 from collections.abc import Callable
 from collections.abc import Sequence
+from pathlib import Path
 from typing import NoReturn
 
 from ctr_pvs import Equilibrium
@@ -20,8 +21,13 @@ from ctr_pvs import Status
 from ctr_pvs import load_robot
 from ctr_pvs.errors import FieldError
 from ctr_pvs.errors import RobotFileError
+from ctr_pvs.figures import PictureError
 from ctr_pvs.report import answer_as_json
 from ctr_pvs.report import answer_as_text
+from ctr_pvs.reproduce import as_json
+from ctr_pvs.reproduce import as_text
+from ctr_pvs.reproduce import reproduce
+from ctr_pvs.reproduce import save_pictures
 
 SUCCESS = 0
 BAD_INPUT = 2
@@ -33,6 +39,7 @@ EXIT_CODES = (
 )
 
 MOST_POSES = 100_000
+PICTURES = Path("reproduce")
 
 
 class UsageError(ValueError):
@@ -132,6 +139,37 @@ def _exit_code(equilibrium: Equilibrium) -> int:
     return NO_ANSWER_IN_TIME_OR_TOLERANCE
 
 
+def _declare_reproduce(subcommands: argparse._SubParsersAction[_Parser]) -> None:
+    reproduction = subcommands.add_parser(
+        "reproduce",
+        allow_abbrev=False,
+        help="the seed paper's numbers beside ours; draws its Fig. 2 and Fig. 4",
+        description="Computes Fig. 2, Fig. 4, eq. (31) and Table II of Renda et al. 2021 and prints the paper's number "
+        "beside ours and the difference. Draws fig2.png and fig4.png (needs matplotlib).",
+    )
+    reproduction.add_argument(
+        "--json", action="store_true", help="print a list of {name, seed, ours, difference}; draw only with --output"
+    )
+    reproduction.add_argument("--output", type=Path, metavar="DIR", help=f"folder for the pictures ({PICTURES})")
+    reproduction.set_defaults(run=_reproduce)
+
+
+def _reproduce(arguments: argparse.Namespace) -> int:
+    reproduction = reproduce()
+    print(as_json(reproduction) if arguments.json else as_text(reproduction))
+    if arguments.output is None and arguments.json:
+        return SUCCESS
+    try:
+        paths = save_pictures(reproduction, arguments.output or PICTURES)
+    except PictureError as error:
+        raise UsageError(str(error)) from error
+    except OSError as error:
+        raise UsageError(f"--output: cannot write the pictures: {error}") from error
+    if not arguments.json:
+        print("\nPictures:", *paths)
+    return SUCCESS
+
+
 class _Parser(argparse.ArgumentParser):
     """Says what is wrong in one line, without the usage before it."""
 
@@ -147,7 +185,7 @@ def _parser() -> _Parser:
         epilog=EXIT_CODES,
     )
     subcommands = parser.add_subparsers(metavar="SUBCOMMAND", required=True)
-    for declare in (_declare_solve,):
+    for declare in (_declare_solve, _declare_reproduce):
         declare(subcommands)
     return parser
 

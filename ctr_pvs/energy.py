@@ -19,7 +19,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ctr_pvs.basis import LegendreRule
+from ctr_pvs.basis import GaussRule
 from ctr_pvs.basis import gauss_legendre
 from ctr_pvs.materials import Materials
 from ctr_pvs.twist import TwistSpace
@@ -52,7 +52,7 @@ class SectionNodes:
     """
 
     section: int
-    rule: LegendreRule
+    rule: GaussRule
     s: Array
     weight: Array
     bending: Array
@@ -69,7 +69,7 @@ class TorsionEnergy:
         self.materials = materials
         self.space = TwistSpace(materials, degree)
         self.n = self.space.n
-        self.nodes = [self._nodes(int(m), self.space.rule()) for m in np.flatnonzero(materials.coupled)]
+        self.nodes = [self._nodes(int(m), self.space.basis(int(m)).rule) for m in np.flatnonzero(materials.coupled)]
         tubes = materials.robot.n_tubes
         stacked = [self.space.angle_map(node.section, node.rule.x) for node in self.nodes]
         self.angle_map = np.concatenate([np.zeros((0, tubes, self.n)), *stacked])
@@ -81,7 +81,7 @@ class TorsionEnergy:
         self.coupling = weights / sums  # quadrature weight over total bending stiffness
         self.slices = self._node_slices()
 
-    def _nodes(self, m: int, rule: LegendreRule) -> SectionNodes:
+    def _nodes(self, m: int, rule: GaussRule) -> SectionNodes:
         domain = self.materials.domain
         length = domain.lengths[m]
         s = domain.boundaries[m] + length * rule.x
@@ -95,7 +95,7 @@ class TorsionEnergy:
     @cached_property
     def plain_nodes(self) -> list[SectionNodes]:
         """Gauss points of the sections whose energy does not depend on psi."""
-        rule = gauss_legendre(0, PLAIN_NODES)
+        rule = gauss_legendre(PLAIN_NODES)
         return [self._nodes(int(m), rule) for m in np.flatnonzero(~self.materials.coupled)]
 
     @cached_property

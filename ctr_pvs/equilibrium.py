@@ -17,6 +17,7 @@ from ctr_pvs.backbone import bishop_frames
 from ctr_pvs.backbone import material_poses
 from ctr_pvs.renda2021 import printed_forces
 from ctr_pvs.shape import Shape
+from ctr_pvs.snap import Snap
 from ctr_pvs.solution import Solution
 from ctr_pvs.status import NoEquilibriumError
 from ctr_pvs.status import Status
@@ -34,6 +35,7 @@ class Equilibrium:
     error_estimate : estimated tip error of discretisation and integration [m]; NaN without an equilibrium.
     residual : largest twist [rad] that the unbalanced torque left after the solve would cause; NaN likewise.
     iterations : Newton iterations spent on the way from the start to this answer.
+    snaps : the snaps on the way, each with its place on the path, the states before and after, and the energy released.
 
     Shapes and loads raise ``NoEquilibriumError`` where there is no equilibrium.  Where the tolerance was missed they
     are there, while ``success`` is false.
@@ -50,6 +52,7 @@ class Equilibrium:
     residual: float = np.nan
     iterations: int = 0
     solution: Solution | None = field(default=None, repr=False)
+    snaps: tuple[Snap, ...] = field(default=(), repr=False)
 
     @property
     def success(self) -> bool:
@@ -142,6 +145,11 @@ class Equilibrium:
         """Smallest eigenvalue of the energy Hessian relative to torsional stiffness, clipped at 1; NaN without
         equilibrium."""
         return float("nan") if self.solution is None else self.solution.stability_margin()
+
+    @cached_property
+    def snap_reserve(self) -> float:
+        """Early warning: 1 at the relaxed robot, 0 at a fold, falling smoothly where the margin still stands at 1."""
+        return self._solved.snap_reserve()
 
     @cached_property
     def jacobian(self) -> Array:

@@ -58,7 +58,7 @@ class FullEnergy:
         self.materials, self.alpha = materials, alpha
         self.space = FullSpace(materials, alpha, basis)
         self.n = self.space.n
-        self.rule = gauss_legendre(0, nodes)
+        self.rule = gauss_legendre(nodes)
         self._stack = self._tabulate()
 
     def _tabulate(self) -> _Stack:

@@ -119,8 +119,16 @@ class FullSolution(Solution):
         schur = basis.T @ hessian @ basis - mixed @ np.linalg.lstsq(stiff, mixed.T, rcond=1e-13)[0]
         return min(1.0, float(eigvalsh(0.5 * (schur + schur.T))[0]))
 
+    def snap_reserve(self) -> float:
+        """That of the `torsion` solution, which this one converges to as its basis grows."""
+        return self._limit.snap_reserve()
+
     def tip_jacobian(self, tolerance: float) -> Array:
         """Rates of the `torsion` solution, which this one converges to as its basis grows."""
+        return self._limit.tip_jacobian(tolerance)
+
+    @property
+    def _limit(self) -> TorsionSolution:
         if self.limit is None:
-            raise NoEquilibriumError("the tip Jacobian needs the torsion solution that this one came from")
-        return self.limit.tip_jacobian(tolerance)
+            raise NoEquilibriumError("rates need the torsion solution that this full one came from")
+        return self.limit

@@ -145,7 +145,7 @@ class FullSpace:
 
     def _twist(self, section: StrainSection, x: Array) -> Array:
         """(g, N, n) int_0^x psi' ds from the section's start: J_theta of eq. (22) and the leading tube's own twist."""
-        rule = gauss_legendre(0, INTEGRATION_NODES)
+        rule = gauss_legendre(INTEGRATION_NODES)
         rate, _ = self._local(section, (x[:, None] * rule.x).ravel())
         weighted = rate.reshape(len(x), len(rule.x), *rate.shape[1:]) * rule.weights[:, None, None]
         return section.length * x[:, None, None] * weighted.sum(axis=1)

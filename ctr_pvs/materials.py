@@ -51,6 +51,18 @@ class Materials:
         """(M,) true for sections where two or more curved tubes overlap: only there do tubes twist one another."""
         return self.curved.sum(axis=1) >= 2
 
+    def coupling(self, m: int) -> float:
+        """Strength of the coupling in section m: the most that twist can be pulled, relative to torsion (two tubes of
+        constant pre-curvature: lambda of the stability literature)."""
+        start, length = self.domain.boundaries[m], self.domain.lengths[m]
+        tubes = self.curved[m]
+        kappa = np.abs(self.pre_curvature(m, start + length * np.linspace(0.0, 1.0, 5))).max(axis=0)[tubes]
+        moment = self.bending[m, tubes] * kappa
+        pull = np.outer(moment, moment) / self.bending[m].sum()
+        soft = 1.0 / np.sqrt(self.torsional[m, tubes])
+        laplacian = np.diag(pull.sum(axis=1)) - pull
+        return float(length**2 * np.linalg.eigvalsh(laplacian * np.outer(soft, soft))[-1])
+
     def _per_section(self, value: Callable[[Segment], float]) -> Array:
         table = np.zeros(self.domain.segment.shape)
         for m, tube in zip(*np.nonzero(self.domain.segment != ABSENT), strict=True):

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections import OrderedDict
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ctr_pvs.convexity import PairForm
 from ctr_pvs.energy import TorsionEnergy
 from ctr_pvs.materials import Materials
 from ctr_pvs.robot import Robot
@@ -22,6 +24,7 @@ class Models:
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
         self._kept: OrderedDict[tuple[bytes, int], TorsionEnergy] = OrderedDict()
+        self._pairs: WeakKeyDictionary[TorsionEnergy, PairForm] = WeakKeyDictionary()
 
     def energy(self, D: NDArray[np.float64], degree: int) -> TorsionEnergy:
         """The energy at ``D`` (N,) [m] with twist rates of polynomial ``degree`` in coupled sections."""
@@ -34,3 +37,9 @@ class Models:
         if len(self._kept) > KEPT:
             self._kept.popitem(last=False)
         return energy
+
+    def pair_form(self, energy: TorsionEnergy) -> PairForm:
+        """The pairwise coupling of ``energy``, made once."""
+        if energy not in self._pairs:
+            self._pairs[energy] = PairForm(energy)
+        return self._pairs[energy]

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Generic
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,10 +24,12 @@ from ctr_pvs.shape import Shape
 from ctr_pvs.solution import Solution
 from ctr_pvs.solution import TorsionlessSolution
 from ctr_pvs.solution import TorsionSolution
+from ctr_pvs.solve import NewtonEnd
 from ctr_pvs.solve import newton
 from ctr_pvs.strain_basis import PolynomialBasis
 
 Array = NDArray[np.float64]
+S = TypeVar("S", bound=Solution)
 
 #: Polynomial degrees of the twist rates, tried in turn.
 DEGREES = (5, 7, 9, 12, 16, 21, 28)
@@ -37,48 +41,50 @@ LOOSER = 64.0
 
 
 @dataclass(frozen=True, eq=False)
-class Refined:
+class Refined(Generic[S]):
     """A state with its residual twist [rad], its error estimate [m] and the Newton iterations spent."""
 
-    solution: Solution
+    solution: S
     residual: float
     estimate: float
     iterations: int
 
 
 @dataclass(frozen=True, eq=False)
-class _Rung:
-    solution: Solution
+class _Rung(Generic[S]):
+    solution: S
     residual: float
     iterations: int
 
 
-def refine_torsion(models: Models, state: State, degrees: tuple[int, ...], tolerance: float) -> Refined | None:
+def refine_torsion(
+    models: Models, state: State, degrees: tuple[int, ...], tolerance: float
+) -> Refined[TorsionSolution] | None:
     """The `torsion` level; None if a higher degree has no stable equilibrium next to the lower one's."""
     return _climb(_torsion_rungs(models, state, degrees), tolerance)
 
 
-def refine_full(models: Models, start: TorsionSolution, tolerance: float) -> Refined | None:
+def refine_full(start: TorsionSolution, tolerance: float) -> Refined[FullSolution] | None:
     """The `full` level with Legendre bases, from the `torsion` equilibrium that it converges to."""
-    return _climb(_full_rungs(models, start), tolerance)
+    return _climb(_full_rungs(start), tolerance)
 
 
-def torsionless(models: Models, alpha: Array, D: Array, tolerance: float) -> Refined:
+def torsionless(models: Models, alpha: Array, D: Array, tolerance: float) -> Refined[TorsionSolution] | None:
     """Eq. (28)-(31): no twist, closed form.  The estimate is the tip motion of one Newton step of the twist it
-    neglects, infinite where twist would not come back at all."""
+    neglects; None where twist would not come back at all."""
     energy = models.energy(D, DEGREES[0])
     untwisted = np.zeros(energy.n)
     solution = TorsionlessSolution(energy, alpha)
     step = newton(energy, alpha, untwisted, steps=1)
-    if not step.iterations and energy.n:
-        return Refined(solution, step.residual, np.inf, 0)
+    if step.end is NewtonEnd.INDEFINITE:
+        return None
     fine = INTEGRATION_SHARE * tolerance
     twisted = TorsionSolution(energy, alpha, step.q).shape
     estimate = np.linalg.norm(tip_position(twisted, fine) - tip_position(solution.shape, LOOSER * fine))
     return Refined(solution, step.residual, float(estimate), 0)
 
 
-def _climb(rungs: Iterator[_Rung | None], tolerance: float) -> Refined | None:
+def _climb(rungs: Iterator[_Rung[S] | None], tolerance: float) -> Refined[S] | None:
     tip, iterations, refined = None, 0, None
     integration = LOOSER * INTEGRATION_SHARE * tolerance
     for rung in rungs:
@@ -95,7 +101,7 @@ def _climb(rungs: Iterator[_Rung | None], tolerance: float) -> Refined | None:
     return refined
 
 
-def _torsion_rungs(models: Models, state: State, degrees: tuple[int, ...]) -> Iterator[_Rung | None]:
+def _torsion_rungs(models: Models, state: State, degrees: tuple[int, ...]) -> Iterator[_Rung[TorsionSolution] | None]:
     torques = state.torques
     for degree in degrees:
         energy = models.energy(state.D, degree)
@@ -108,7 +114,7 @@ def _torsion_rungs(models: Models, state: State, degrees: tuple[int, ...]) -> It
         yield _Rung(solution, result.residual, result.iterations)
 
 
-def _full_rungs(models: Models, start: TorsionSolution) -> Iterator[_Rung | None]:
+def _full_rungs(start: TorsionSolution) -> Iterator[_Rung[FullSolution] | None]:
     shape: Shape = start.shape
     for degree in FULL_DEGREES:
         energy = FullEnergy(start.energy.materials, start.alpha, PolynomialBasis(degree), nodes=degree + 6)

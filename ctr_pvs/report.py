@@ -70,7 +70,7 @@ def answer_as_text(robot: Robot, equilibrium: Equilibrium, degrees: bool) -> str
         f"tip position     {_components('xyz', 1e3 * tip.position, 4)}  mm",
         f"tip orientation  {_components('xyzw', tip.orientation, 6)}",
         "",
-        *_table(_header(equilibrium, degrees), *_rows(robot, equilibrium, degrees)),
+        *aligned(_header(equilibrium, degrees), *_rows(robot, equilibrium, degrees)),
         LOAD_NOTE,
         *([KINK_NOTE] if equilibrium.kink else []),
         "",
@@ -141,7 +141,7 @@ def _rows(robot: Robot, equilibrium: Equilibrium, degrees: bool) -> list[list[st
     return rows
 
 
-def _table(*rows: list[str]) -> list[str]:
+def aligned(*rows: list[str]) -> list[str]:
     """Lines with columns as wide as their widest cell; the first column left, the others right."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return [

@@ -3,8 +3,8 @@
 Units are SI. Pre-curvature is carried as one complex number, kappa_y + i kappa_z, because turning a material frame by
 psi about the tangent is then a product with exp(i psi).
 
-The ranges below refuse what no concentric tube robot is, mostly numbers meant in millimetres or gigapascals, and keep
-every later product far from overflow.
+The ranges below refuse what no concentric tube robot is, from a thousand times smaller than a surgical one to a
+thousand times larger, and keep every later product far from overflow.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from ctr_pvs.command import CommandBounds
 from ctr_pvs.command import Range
 from ctr_pvs.errors import RobotError
 
-LENGTH_RANGE = (1e-6, 10.0)  # m, of a segment; the shortest is far above the slack within which boundaries coincide
-DIAMETER_RANGE = (0.0, 0.1)  # m
-STIFFNESS_RANGE = (1e-12, 1e6)  # N m^2; a 2.4 mm nitinol tube has 0.05
+LENGTH_RANGE = (1e-7, 1e3)  # m, of a segment; the shortest is far above the slack within which boundaries coincide
+DIAMETER_RANGE = (0.0, 10.0)  # m
+STIFFNESS_RANGE = (1e-18, 1e12)  # N m^2; a 2.4 mm nitinol tube has 0.05
 MODULUS_RANGE = (1e3, 1e13)  # Pa; softer than any gel to stiffer than diamond
-LARGEST_CURVATURE = 1e4  # 1/m
+LARGEST_CURVATURE = 1e6  # 1/m
 LARGEST_TURN = 1e5  # rad/m
 
 _T = TypeVar("_T")

@@ -60,10 +60,11 @@ class Row:
 
 def row(name: str, what: str, ours: float) -> Row:
     """The row of ``name``, with the paper's number if it prints one under this name."""
+    ours = float(ours) + 0.0  # no minus before a zero
     if name not in PRINTED:
-        return Row(name, what, float(ours))
+        return Row(name, what, ours)
     text, where = PRINTED[name]
-    return Row(name, what, float(ours), float(text), text, where)
+    return Row(name, what, ours, float(text), text, where)
 
 
 @dataclass(frozen=True)

@@ -93,7 +93,8 @@ def fig2() -> tuple[Part, dict[str, Branch]]:
     """The rows of Fig. 2, and its three equilibria by name."""
     converged = fig2_equilibria(PolynomialBasis(CONVERGED_DEGREE))
     tips = {name: _points(converged[name].shape)[-1] for name in BRANCHES}
-    rows, linear = [], {}
+    rows: list[Row] = []
+    linear: dict[str, FullSolution] = {}
     for degree, word in FIG2_BASES.items():
         found = fig2_equilibria(PolynomialBasis(degree, orthogonal=False))
         linear = linear or found
@@ -154,8 +155,8 @@ def fig4() -> tuple[Part, dict[str, Sweep]]:
         "Fig. 4: the robot of Fig. 3, quadratic basis, D_1 = 93.5 mm, D_2 = 208.5 | 170.5 mm (section III-C)",
         tuple(rows),
         (
-            "Ours is the error of the quadratic basis: its distance from the converged model. The seed's numbers are "
-            "distances from published curves of its ref. [21], so they hold that comparison's errors too.",
+            "Ours is the error of the quadratic basis: its distance from our converged tips. The seed's is a distance "
+            "from the simulations of its reference [21], another yardstick.",
         ),
     )
     return part, sweeps
@@ -189,7 +190,7 @@ def eq31() -> Part:
     for i in range(4):
         tube = i % 2 + 1
         what = f"q_{i + 1} = EI_{tube} / (EI_1 + EI_2)"
-        rows.append(Row(f"eq31_q{i + 1}", what, float(q[i]), float(expected[i]), f"{expected[i]:.6f}", "eq. (31)"))
+        rows.append(Row(f"eq31_q{i + 1}", what, float(q[i]), float(expected[i]), f"{expected[i]:.4f}", "eq. (31)"))
     largest = float(np.abs(q - expected).max())
     return Part(
         "Eq. (31): two torsionless, fully overlapping tubes, pre-curvatures that vary in both planes (section III-A)",
@@ -228,8 +229,8 @@ def solved(equilibrium: Equilibrium) -> Equilibrium:
 def _branch(converged: FullSolution, linear: FullSolution) -> Branch:
     shape = converged.shape
     joint = int(np.argmin(np.abs(_places(shape) - shape.domain.boundaries[1])))
-    points = [_points(solution.shape) for solution in (converged, linear)]
-    return Branch(theta_2(shape), converged.stability_margin(), *points, joint)
+    margin = converged.stability_margin()
+    return Branch(theta_2(shape), margin, _points(shape), _points(linear.shape), joint)
 
 
 def _places(shape: Shape) -> Array:

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor
 from scipy.linalg import cho_solve
 
-from ctr_pvs.basis import legendre
 from ctr_pvs.energy import TorsionEnergy
 from ctr_pvs.sections import ABSENT
 from ctr_pvs.twist import TorqueField
@@ -106,7 +105,7 @@ class Sensitivity:
         coefficients = self.torques.sections[m]
         stiffness = self.energy.materials.torsional[m]
         compliance = np.divide(1.0, stiffness, out=np.zeros_like(stiffness), where=stiffness > 0.0)
-        return legendre(coefficients.shape[1] - 1, x)[1] @ coefficients.T * compliance
+        return self.torques.bases[m].tabulate(x)[1] @ coefficients.T * compliance
 
     def angle_rate(self, m: int, x: Array) -> Array:
         """(g, N, P) total d psi [rad per unit] at the places ``x`` of section m."""

@@ -9,7 +9,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ctr_pvs.basis import legendre
 from ctr_pvs.energy import shared_curvature
 from ctr_pvs.materials import Materials
 from ctr_pvs.sections import ABSENT
@@ -65,14 +64,20 @@ class Shape(ABC):
         """psi (g, N) [rad] at arc lengths ``s`` (g,) [m], NaN where a tube has ended (its tip still counts)."""
         if not self.domain.n_sections:
             return np.repeat(self.angle_at_boundaries, len(s), axis=0)
-        psi = np.full((len(s), len(self.alpha)), np.nan)
+        psi = self.angles_held(s)
+        psi[self.domain.segment[self.domain.locate(s)] == ABSENT] = np.nan
+        at_orifice = s <= self.domain.boundaries[0]
+        psi[at_orifice] = self.angle_at_boundaries[0]  # a tube that ends on the orifice has an angle there
+        return psi
+
+    def angles_held(self, s: Array) -> Array:
+        """psi (g, N) [rad] at arc lengths ``s`` (g,) [m], where past its tip a tube keeps its last angle."""
+        psi = np.empty((len(s), len(self.alpha)))
         section = self.domain.locate(s)
         for m in np.unique(section):
             here = section == m
             x = (s[here] - self.domain.boundaries[m]) / self.domain.lengths[m]
-            psi[here] = np.where(self.domain.segment[m] == ABSENT, np.nan, self.angle(int(m), x))
-        at_orifice = s <= self.domain.boundaries[0]
-        psi[at_orifice] = self.angle_at_boundaries[0]  # a tube that ends on the orifice has an angle there
+            psi[here] = self.angle(int(m), x)
         return psi
 
 
@@ -91,13 +96,11 @@ class TorsionShape(Shape):
 
     def angle(self, m: int, x: Array) -> Array:
         psi = np.broadcast_to(self.angle_at_boundaries[m], (len(x), len(self.alpha)))
-        coefficients = self.torques.sections[m]
-        twist = legendre(coefficients.shape[1] - 1, x)[1] @ coefficients.T
+        twist = self.torques.bases[m].tabulate(x)[1] @ self.torques.sections[m].T
         return psi + twist * self._compliance(m)
 
     def twist_rate(self, m: int, x: Array) -> Array:
-        coefficients = self.torques.sections[m]
-        torque = legendre(coefficients.shape[1] - 1, x)[0] @ coefficients.T
+        torque = self.torques.bases[m].tabulate(x)[0] @ self.torques.sections[m].T
         return torque * self._compliance(m) / self.domain.lengths[m]
 
     def curvature(self, m: int, x: Array) -> ComplexArray:
@@ -112,9 +115,9 @@ class TorsionShape(Shape):
     @cached_property
     def angle_at_boundaries(self) -> Array:
         psi = [self.alpha + self.materials.guide_compliance * self.torques.guide]
-        for m, coefficients in enumerate(self.torques.sections):
-            # Only the constant polynomial has a mean.
-            psi.append(psi[-1] + coefficients[:, 0] * self._compliance(m))
+        for m, (basis, coefficients) in enumerate(zip(self.torques.bases, self.torques.sections, strict=True)):
+            mean = coefficients @ basis.tabulate(np.ones(1))[1][0]
+            psi.append(psi[-1] + mean * self._compliance(m))
         return np.array(psi)
 
 

@@ -15,7 +15,8 @@ from ctr_pvs.jacobian import tip_jacobian
 from ctr_pvs.shape import Shape
 from ctr_pvs.shape import TorsionlessShape
 from ctr_pvs.shape import TorsionShape
-from ctr_pvs.stability import stability_margin
+from ctr_pvs.stability import rechecked_margin
+from ctr_pvs.stability import snap_reserve
 
 Array = NDArray[np.float64]
 
@@ -45,6 +46,10 @@ class Solution(ABC):
         """Smallest eigenvalue of the energy Hessian relative to torsional stiffness, clipped at 1."""
 
     @abstractmethod
+    def snap_reserve(self) -> float:
+        """1 at the relaxed robot, 0 at a fold, falling smoothly."""
+
+    @abstractmethod
     def tip_jacobian(self, tolerance: float) -> Array:
         """(6, 2 N) rates of the tip; ``tolerance`` [m] of the backbone's integration."""
 
@@ -67,7 +72,10 @@ class TorsionSolution(Solution):
         return self.energy.value(self.q, self.alpha) + self.energy.constant()
 
     def stability_margin(self) -> float:
-        return stability_margin(self.energy, self.q, self.alpha)
+        return rechecked_margin(self.energy, self.q, self.alpha)
+
+    def snap_reserve(self) -> float:
+        return snap_reserve(self.energy, self.q, self.alpha)
 
     def tip_jacobian(self, tolerance: float) -> Array:
         return tip_jacobian(self.energy, self.shape, tolerance)

@@ -8,12 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from numpy.typing import NDArray
 
-from ctr_pvs.continuation import Followed
-from ctr_pvs.continuation import PathEnd
 from ctr_pvs.continuation import State
-from ctr_pvs.continuation import follow
 from ctr_pvs.equilibrium import Equilibrium
 from ctr_pvs.errors import FieldError
+from ctr_pvs.full_solution import FullSolution
 from ctr_pvs.models import Models
 from ctr_pvs.refine import DEGREES
 from ctr_pvs.refine import Refined
@@ -23,8 +21,14 @@ from ctr_pvs.refine import torsionless
 from ctr_pvs.relaxed import relaxed_state
 from ctr_pvs.renda2021 import check_renda2021
 from ctr_pvs.robot import Robot
+from ctr_pvs.snap import Snap
 from ctr_pvs.solution import TorsionSolution
+from ctr_pvs.status import NoEquilibriumError
 from ctr_pvs.status import Status
+from ctr_pvs.travel import TravelEnd
+from ctr_pvs.travel import Travelled
+from ctr_pvs.travel import distance_to_snap
+from ctr_pvs.travel import travel
 
 Array = NDArray[np.float64]
 
@@ -57,6 +61,33 @@ class EquilibriumSolver:
         self._models = Models(robot)
         self._last: State | None = None
 
+    def follow(self, alpha: ArrayLike, D: ArrayLike, budget: float | None = None) -> Equilibrium:
+        """Go from the last good answer to (alpha, D) along the straight path, through folds: ``solve`` with a warm
+        start.
+
+        Rotation and sliding may come together.  Where the branch ends the robot snaps: the status is SNAP, and
+        ``answer.snaps`` tells for each one the fraction of the path, alpha and D there, the states before and after,
+        and the energy released.
+        """
+        return self.solve(alpha, D, "warm", budget)
+
+    def distance_to_snap(self, budget: float | None = None, turn: float = 4.0 * np.pi) -> Array:
+        """(2 N, 2) how far each actuator, alpha_1 .. alpha_N [rad] and D_1 .. D_N [m], can go from the last good answer
+        towards - and + before the stable branch ends.
+
+        turn : how far to look in rotation [rad]; D is looked at between its neighbours and its tube's length.
+        Infinite where no snap lies in reach; NaN where the ``budget`` [s] ran out first.
+
+        Raises ``NoEquilibriumError`` without a last good answer, and where no tubes are coupled.
+        """
+        if self._last is None:
+            raise NoEquilibriumError("no coupled equilibrium to start from: solve a command first")
+        alpha, D = self._last.alpha, self._last.D
+        lengths = np.array([tube.length for tube in self.robot.tubes])
+        lowest, highest = np.append(0.0, D[:-1]), np.minimum(np.append(D[1:], np.inf), lengths)
+        bounds = np.concatenate([alpha - turn, lowest]), np.concatenate([alpha + turn, highest])
+        return distance_to_snap(self._models, self._last, bounds, DEGREES[1], _deadline(budget))
+
     def reset(self) -> None:
         """Forget the warm start: the next solve is cold."""
         self._last = None
@@ -74,12 +105,10 @@ class EquilibriumSolver:
         ``ValueError``.
         """
         _check_option("start", start, ("warm", "cold"))
-        if budget is not None and not budget > 0.0:
-            raise FieldError("budget", budget, "seconds above 0, or None")
+        deadline = _deadline(budget)
         alpha, D = self.robot.check_command(alpha, D)
         if self._level == "torsionless":
             return self._torsionless(alpha, D)
-        deadline = np.inf if budget is None else time.monotonic() + budget
         origin, note = self._origin(alpha, D, start)
         if origin is None:
             return self._failure(alpha, D, Status.NOT_CONVERGED, note)
@@ -99,47 +128,58 @@ class EquilibriumSolver:
         return State(begin, D, energy.space.field(relaxed.q)), note
 
     def _answer(self, origin: State, alpha: Array, D: Array, deadline: float, note: str) -> Equilibrium:
-        """Follow the path at the lowest degree that keeps the branch up to the converged model, then refine."""
+        """Travel at the lowest degree that keeps the branch up to the converged model, then refine."""
         iterations = 0
         for index, degree in enumerate(DEGREES[:-1]):
-            followed = follow(self._models, origin, alpha, D, degree, deadline)
-            iterations += followed.iterations
-            if followed.end is PathEnd.TIMEOUT:
-                return self._failure(
-                    alpha, D, Status.TIMEOUT, f"out of time at {followed.t:.3g} of the path", iterations
-                )
-            if followed.end is PathEnd.FOLD:
-                return self._failure(alpha, D, Status.NO_STABLE_EQUILIBRIUM, _fold_message(followed), iterations)
-            refined = refine_torsion(self._models, followed.state, DEGREES[index:], self.tolerance)
+            journey = travel(self._models, origin, alpha, D, degree, deadline)
+            iterations += journey.iterations
+            if journey.end is not TravelEnd.REACHED:
+                return self._failure(alpha, D, _STATUS[journey.end], _stopped(journey), iterations)
+            refined = refine_torsion(self._models, journey.state, DEGREES[index:], self.tolerance)
             if refined is not None:
-                return self._keep(refined, iterations, note)
+                return self._keep(refined, journey.snaps, iterations + refined.iterations, note)
         message = "the refined model lost the branch that the coarse one followed: a fold is very near this command"
         return self._failure(alpha, D, Status.NOT_CONVERGED, message, iterations)
 
-    def _keep(self, refined: Refined, iterations: int, note: str) -> Equilibrium:
+    def _keep(
+        self, torsion: Refined[TorsionSolution], snaps: tuple[Snap, ...], iterations: int, note: str
+    ) -> Equilibrium:
         """The answer of the level that was asked for; a good one is kept as the next warm start."""
-        torsion = refined.solution
-        assert isinstance(torsion, TorsionSolution)
-        iterations += refined.iterations
-        alpha, D = torsion.alpha, torsion.energy.materials.domain.D
+        refined: Refined[TorsionSolution] | Refined[FullSolution] = torsion
+        alpha, D = torsion.solution.alpha, torsion.solution.energy.materials.domain.D
         if self._level == "full":
-            full = refine_full(self._models, torsion, self.tolerance)
+            full = refine_full(torsion.solution, self.tolerance)
             if full is None:
                 message = "Newton at the full level does not converge from the torsion equilibrium"
                 return self._failure(alpha, D, Status.NOT_CONVERGED, message, iterations)
             refined, iterations = full, iterations + full.iterations
-        answer = self._success(alpha, D, refined, iterations, note)
+        answer = self._success(alpha, D, refined, iterations, note, snaps)
         if answer.success:
             # Tubes that are not coupled remember nothing: what follows sets out from the relaxed robot.
-            self._last = State(alpha, D, torsion.shape.torques) if torsion.degrees_of_freedom else None
+            coupled = torsion.solution.degrees_of_freedom > 0
+            self._last = State(alpha, D, torsion.solution.shape.torques) if coupled else None
         return answer
 
     def _torsionless(self, alpha: Array, D: Array) -> Equilibrium:
         """The closed form, with what it neglects told by its error estimate."""
-        return self._success(alpha, D, torsionless(self._models, alpha, D, self.tolerance), 0, "; twist is neglected")
+        refined = torsionless(self._models, alpha, D, self.tolerance)
+        if refined is None:
+            message = "the untwisted state is unstable: twist cannot be neglected here"
+            return self._failure(alpha, D, Status.NO_STABLE_EQUILIBRIUM, message)
+        return self._success(alpha, D, refined, 0, "; twist is neglected")
 
-    def _success(self, alpha: Array, D: Array, refined: Refined, iterations: int, note: str) -> Equilibrium:
+    def _success(
+        self,
+        alpha: Array,
+        D: Array,
+        refined: Refined[TorsionSolution] | Refined[FullSolution],
+        iterations: int,
+        note: str,
+        snaps: tuple[Snap, ...] = (),
+    ) -> Equilibrium:
         status, message = Status.OK, "stable equilibrium" + note
+        if snaps:
+            status, message = Status.SNAP, _snapped(snaps) + note
         if refined.estimate > self.tolerance:
             status = Status.TOLERANCE_MISSED
             needed = f"{self.tolerance:.1e} m were asked for"
@@ -156,6 +196,7 @@ class EquilibriumSolver:
             refined.residual,
             iterations,
             refined.solution,
+            snaps,
         )
 
     def _failure(self, alpha: Array, D: Array, status: Status, message: str, iterations: int = 0) -> Equilibrium:
@@ -164,12 +205,42 @@ class EquilibriumSolver:
         )
 
 
-def _fold_message(followed: Followed) -> str:
-    alpha = ", ".join(f"{angle:.6g}" for angle in followed.state.alpha)
-    D = ", ".join(f"{length:.6g}" for length in followed.state.D)
-    return f"the stable branch ends on the way, at alpha = [{alpha}] rad, D = [{D}] m: approach from another side"
+_STATUS = {
+    TravelEnd.TIMEOUT: Status.TIMEOUT,
+    TravelEnd.NO_LANDING: Status.NO_STABLE_EQUILIBRIUM,
+    TravelEnd.TOO_MANY_SNAPS: Status.NOT_CONVERGED,
+}
+
+
+def _stopped(journey: Travelled) -> str:
+    place = _place(journey.state.alpha, journey.state.D)
+    return f"{journey.end.value}: stopped at {journey.t:.6g} of the path, {place}"
+
+
+def _snapped(snaps: tuple[Snap, ...]) -> str:
+    """What happened on the way, for people; ``Equilibrium.snaps`` has the states."""
+    last = snaps[-1]
+    many = "snapped" if len(snaps) == 1 else f"snapped {len(snaps)} times, the last time"
+    released = sum(snap.energy_released for snap in snaps)
+    return (
+        f"{many} at {last.t:.6g} of the path, {_place(last.alpha, last.D)}, releasing {released:.3g} J in all; "
+        "the landing is a prediction, real snaps are dynamic"
+    )
+
+
+def _place(alpha: Array, D: Array) -> str:
+    angles = ", ".join(f"{angle:.6g}" for angle in alpha)
+    lengths = ", ".join(f"{length:.6g}" for length in D)
+    return f"alpha = [{angles}] rad, D = [{lengths}] m"
 
 
 def _check_option(name: str, value: str, choices: tuple[str, ...]) -> None:
     if value not in choices:
         raise FieldError(name, value, f"one of {', '.join(choices)}")
+
+
+def _deadline(budget: float | None) -> float:
+    """``time.monotonic()`` value after which to give up."""
+    if budget is not None and not budget > 0.0:
+        raise FieldError("budget", budget, "seconds above 0, or None")
+    return np.inf if budget is None else time.monotonic() + budget

@@ -1,4 +1,4 @@
-"""How far an equilibrium is from losing stability."""
+"""How far an equilibrium is from losing stability: the margin, and an early warning that moves long before it."""
 
 from __future__ import annotations
 
@@ -7,12 +7,18 @@ from numpy.typing import NDArray
 from scipy.linalg import eigvalsh
 
 from ctr_pvs.energy import TorsionEnergy
+from ctr_pvs.relaxed import relaxed_state
+from ctr_pvs.sections import ABSENT
+from ctr_pvs.sensitivity import Sensitivity
 
 Array = NDArray[np.float64]
 
+#: The margin is checked again with polynomials of this much higher degree: a Ritz value of low degree is optimistic.
+RECHECK = 2
+
 
 def stability_margin(energy: TorsionEnergy, q: Array, alpha: Array) -> float:
-    """Smallest eigenvalue of d2E/dq2 relative to the torsional stiffness, clipped at 1.
+    """Smallest eigenvalue of d2E/dq2 relative to the torsional stiffness, clipped at 1, at the state ``q`` (n,).
 
     1: nothing pulls the tubes off; 0: a fold, where the branch ends; negative: unstable.  The unknowns are scaled so
     that the torsional energy is q.q / 2, hence this is an ordinary eigenvalue.  A twist field outside the basis has 1.
@@ -21,3 +27,39 @@ def stability_margin(energy: TorsionEnergy, q: Array, alpha: Array) -> float:
         return 1.0
     _, hessian = energy.derivatives(q, alpha)
     return min(1.0, float(eigvalsh(hessian, subset_by_index=(0, 0), check_finite=False)[0]))
+
+
+def rechecked_margin(energy: TorsionEnergy, q: Array, alpha: Array) -> float:
+    """The smaller of the margins at this degree and at a higher one, wherever the first is below 1."""
+    margin = stability_margin(energy, q, alpha)
+    if margin == 1.0:
+        return margin
+    finer = TorsionEnergy(energy.materials, energy.space.degree + RECHECK)
+    return min(margin, stability_margin(finer, finer.space.coordinates(energy.space.field(q)), alpha))
+
+
+def snap_reserve(energy: TorsionEnergy, q: Array, alpha: Array) -> float:
+    """What is left of det(d alpha / d psi_tip), as a share of its value at the relaxed robot of the same D.
+
+    1 at the relaxed robot, 0 at a fold, falling smoothly in between, while the margin stays at 1 until a snap is near.
+    It says how much less the tips' rotations are held by the bases (Gilbert, Hendrick, Webster, T-RO 2016).
+    NaN if no relaxed state was found.
+    """
+    if energy.n == 0:
+        return 1.0
+    relaxed = relaxed_state(energy)
+    if relaxed is None:
+        return float("nan")
+    return _tip_gain(energy, relaxed.q, relaxed.alpha) / _tip_gain(energy, q, alpha)
+
+
+def _tip_gain(energy: TorsionEnergy, q: Array, alpha: Array) -> float:
+    """det(d psi_tip / d alpha): how much the tubes' own tips turn with their bases."""
+    tubes = len(alpha)
+    rates = Sensitivity(energy, alpha, q, np.eye(tubes), np.zeros((tubes, tubes)))
+    segment = energy.materials.domain.segment
+    gain = np.eye(tubes)  # a tube that is not out turns with its base
+    for tube in np.flatnonzero(np.any(segment != ABSENT, axis=0)):
+        last = int(np.flatnonzero(segment[:, tube] != ABSENT)[-1])
+        gain[tube] = rates.angle_rate(last, np.ones(1))[0, tube]
+    return float(np.linalg.det(gain))

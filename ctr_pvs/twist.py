@@ -20,12 +20,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ctr_pvs.basis import LegendreRule
-from ctr_pvs.basis import gauss_legendre
-from ctr_pvs.basis import legendre
+from ctr_pvs.basis import TwistBasis
 from ctr_pvs.materials import Materials
 
 Array = NDArray[np.float64]
+
+CONSTANT = TwistBasis(0)
+#: Square root of a section's coupling that one panel of polynomials takes on.  Beyond, a twist kink is short against
+#: the section, and polynomials over all of it would pin the kink where nothing holds it.
+BENDS_A_PANEL = 3.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,12 +37,13 @@ class TorqueField:
 
     guide : (N,) torque [N m] in the guide.
     boundaries : (M + 1,) arc lengths [m] of the sections.
-    sections : per section (N, n) coefficients [N m] of the orthonormal Legendre polynomials.
+    bases, sections : per section the basis, and (N, basis.size) coefficients [N m] of its functions.
     topology : ``Domain.topology`` of the sections.
     """
 
     guide: Array
     boundaries: Array
+    bases: tuple[TwistBasis, ...]
     sections: tuple[Array, ...]
     topology: tuple[object, ...]
 
@@ -53,14 +57,13 @@ class TorqueField:
                 out[here] = self.guide
             elif m < len(self.sections):
                 start, end = self.boundaries[m : m + 2]
-                coefficients = self.sections[m]
-                out[here] = legendre(coefficients.shape[1] - 1, (s[here] - start) / (end - start))[0] @ coefficients.T
+                out[here] = self.bases[m].tabulate((s[here] - start) / (end - start))[0] @ self.sections[m].T
         return out
 
     def moved(self, rate: TorqueField, step: float) -> TorqueField:
         """This field plus ``step`` times ``rate`` (of the same sections)."""
         sections = tuple(a + step * b for a, b in zip(self.sections, rate.sections, strict=True))
-        return TorqueField(self.guide + step * rate.guide, self.boundaries, sections, self.topology)
+        return TorqueField(self.guide + step * rate.guide, self.boundaries, self.bases, sections, self.topology)
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,13 +72,13 @@ class Block:
 
     scale : (N,) square root of the compliance that a unit of q acts through, 0 for tubes that do not twist here.
     frame : (N, r) orthonormal columns, orthogonal to 1 / scale: the zero-torque condition.
-    degree : of the polynomials; columns of q run over (r, degree + 1).
+    basis : functions of x that the torques are made of; columns of q run over (r, basis.size).
     """
 
     section: int
     scale: Array
     frame: Array
-    degree: int
+    basis: TwistBasis
     columns: slice
 
     @property
@@ -99,9 +102,13 @@ class TwistSpace:
         self.blocks = self._blocks()
         self.n = self.blocks[-1].columns.stop if self.blocks else 0
 
-    def rule(self) -> LegendreRule:
-        """Quadrature for the coupled sections: one more point than the polynomials of the twist angle have terms."""
-        return gauss_legendre(self.degree, self.degree + 3)
+    def basis(self, m: int) -> TwistBasis:
+        """The functions that carry the torques of section m: panels where coupling is strong, constants where none
+        is."""
+        if not self.materials.coupled[m]:
+            return CONSTANT
+        panels = int(np.ceil(np.sqrt(self.materials.coupling(m)) / BENDS_A_PANEL))
+        return TwistBasis(self.degree, max(1, panels))
 
     def _twisting(self) -> NDArray[np.bool_]:
         """(last + 1, N) tubes that carry torque in each section: curved in a coupled section from there on."""
@@ -115,21 +122,20 @@ class TwistSpace:
         blocks = []
         lead = np.where(twisting[self.first], self._lead_compliance(self.first), 0.0)
         if lead.any():
-            blocks.append(self._block(-1, np.sqrt(lead), twisting[self.first], 0, 0))
+            blocks.append(self._block(-1, np.sqrt(lead), twisting[self.first], CONSTANT, 0))
         for m in range(self.first, self.last + 1):
             stiffness = self.materials.torsional[m]
             compliance = np.divide(
                 self.materials.domain.lengths[m], stiffness, out=np.zeros_like(stiffness), where=twisting[m]
             )
-            degree = self.degree if self.materials.coupled[m] else 0
             start = blocks[-1].columns.stop if blocks else 0
-            blocks.append(self._block(m, np.sqrt(compliance), twisting[m], degree, start))
+            blocks.append(self._block(m, np.sqrt(compliance), twisting[m], self.basis(m), start))
         return blocks
 
     @staticmethod
-    def _block(section: int, scale: Array, twisting: NDArray[np.bool_], degree: int, start: int) -> Block:
+    def _block(section: int, scale: Array, twisting: NDArray[np.bool_], basis: TwistBasis, start: int) -> Block:
         frame = _zero_torque_frame(scale, twisting)
-        return Block(section, scale, frame, degree, slice(start, start + frame.shape[1] * (degree + 1)))
+        return Block(section, scale, frame, basis, slice(start, start + frame.shape[1] * basis.size))
 
     def _lead_compliance(self, m: int) -> Array:
         """(N,) twist per torque from the tubes' bases to the start of section m [rad/(N m)]."""
@@ -152,7 +158,7 @@ class TwistSpace:
         if block.section < 0:
             return self._lead_share(m, x)[:, :, None] * modes
         # Past its own section a block's twist is complete: the integrals at x = 1.
-        integrals = legendre(block.degree, x if block.section == m else np.ones_like(x))[1]
+        integrals = block.basis.tabulate(x if block.section == m else np.ones_like(x))[1]
         return (modes[None, :, :, None] * integrals[:, None, None, :]).reshape(len(x), len(modes), -1)
 
     def _lead_share(self, m: int, x: Array) -> Array:
@@ -167,16 +173,16 @@ class TwistSpace:
         """The torque field of ``q`` (n,)."""
         domain = self.materials.domain
         none = np.zeros((self.materials.robot.n_tubes, 1))
-        sections = [none] * domain.n_sections
+        sections, bases = [none] * domain.n_sections, [CONSTANT] * domain.n_sections
         guide = np.zeros(self.materials.robot.n_tubes)
         for block in self.blocks:
-            torque = block.spread @ q[block.columns].reshape(-1, block.degree + 1)
+            torque = block.spread @ q[block.columns].reshape(-1, block.basis.size)
             if block.section < 0:
                 guide = torque[:, 0]
                 sections[: self.first] = [torque] * self.first
             else:
-                sections[block.section] = torque
-        return TorqueField(guide, domain.boundaries, tuple(sections), domain.topology)
+                sections[block.section], bases[block.section] = torque, block.basis
+        return TorqueField(guide, domain.boundaries, tuple(bases), tuple(sections), domain.topology)
 
     def coordinates(self, field: TorqueField) -> Array:
         """The q (n,) whose torques are nearest to ``field``: coefficient by coefficient in equal sections, else in
@@ -188,22 +194,23 @@ class TwistSpace:
             q[block.columns] = (block.frame.T @ (block.scale[:, None] * torque)).ravel()
         return q
 
-    @staticmethod
-    def _matching(field: TorqueField, block: Block) -> Array:
+    def _matching(self, field: TorqueField, block: Block) -> Array:
         if block.section < 0:
             return field.guide[:, None]
-        given = field.sections[block.section]
-        torque = np.zeros((len(given), block.degree + 1))
-        shared = min(torque.shape[1], given.shape[1])
-        torque[:, :shared] = given[:, :shared]
-        return torque
+        basis, given = field.bases[block.section], field.sections[block.section]
+        if basis.panels != block.basis.panels:
+            return self._sampled(field, block)
+        torque = np.zeros((len(given), basis.panels, block.basis.degree + 1))
+        shared = min(basis.degree, block.basis.degree) + 1
+        torque[:, :, :shared] = given.reshape(len(given), basis.panels, -1)[:, :, :shared]
+        return torque.reshape(len(given), -1)
 
     def _sampled(self, field: TorqueField, block: Block) -> Array:
         if block.section < 0:
             return field.guide[:, None]
-        rule = gauss_legendre(block.degree, block.degree + 3)
+        rule = block.basis.rule
         start, end = self.materials.domain.boundaries[block.section : block.section + 2]
-        return (field.at(start + rule.x * (end - start)) * rule.weights[:, None]).T @ rule.values
+        return (field.at(start + rule.x * (end - start)) * rule.weights[:, None]).T @ block.basis.tabulate(rule.x)[0]
 
 
 def _zero_torque_frame(scale: Array, twisting: NDArray[np.bool_]) -> Array:

@@ -161,11 +161,11 @@ def test_the_text_table_has_straight_columns_and_no_signed_zeros(capsys):
 
 # --- no answer --------------------------------------------------------------------------------------------------------
 
-PAST_THE_FOLD = [ROBOT, "--alpha", "0", "290", *FIG4, "--degrees"]
+UNSTABLE = [ROBOT, "--alpha", "0", "200", *FIG4, "--degrees", "--fidelity", "torsionless"]  # untwisted: unstable
 
 
-def test_past_a_fold_the_json_says_no_and_leaves_the_rest_null(capsys):
-    answer = strict(solve(capsys, *PAST_THE_FOLD, "--json", code=cli.NO_STABLE_EQUILIBRIUM))
+def test_without_equilibrium_the_json_says_no_and_leaves_the_rest_null(capsys):
+    answer = strict(solve(capsys, *UNSTABLE, "--json", code=cli.NO_STABLE_EQUILIBRIUM))
     assert list(answer) == KEYS
     assert (answer["success"], answer["status"]) == (False, "no_stable_equilibrium")
     assert answer["message"]
@@ -173,8 +173,8 @@ def test_past_a_fold_the_json_says_no_and_leaves_the_rest_null(capsys):
     assert {key for key in KEYS if answer[key] is None} == unknown
 
 
-def test_past_a_fold_the_text_is_one_line_without_numbers_to_trust(capsys):
-    text = solve(capsys, *PAST_THE_FOLD, code=cli.NO_STABLE_EQUILIBRIUM)
+def test_without_equilibrium_the_text_is_one_line_without_numbers_to_trust(capsys):
+    text = solve(capsys, *UNSTABLE, code=cli.NO_STABLE_EQUILIBRIUM)
     assert text.startswith("renda2021: no_stable_equilibrium: ")
     assert len(text.splitlines()) == 1
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from random_robots import random_D
 from random_robots import random_robot
 
 from ctr_pvs import EquilibriumSolver
-from ctr_pvs.basis import gauss_legendre
-from ctr_pvs.basis import legendre
+from ctr_pvs.basis import TwistBasis
 from ctr_pvs.models import Models
 from ctr_pvs.sensitivity import Sensitivity
 
@@ -23,14 +24,17 @@ def random_energy(seed, tubes, degree=4):
             return energy, rng.uniform(-2, 2, tubes), 0.2 * rng.standard_normal(energy.n)
 
 
-def test_legendre_basis_is_orthonormal_and_integrates():
-    rule = gauss_legendre(9, 12)
-    gram = rule.values.T @ (rule.weights[:, None] * rule.values)
-    assert np.allclose(gram, np.eye(10), atol=1e-13)
+@pytest.mark.parametrize("basis", [TwistBasis(9), TwistBasis(4, panels=3)])
+def test_the_basis_is_orthonormal_and_integrates(basis):
+    rule = basis.rule
+    values = basis.tabulate(rule.x)[0]
+    assert np.allclose(values.T @ (rule.weights[:, None] * values), np.eye(basis.size), atol=1e-13)
     x, h = np.linspace(0.05, 0.95, 7), 1e-6
-    slope = (legendre(9, x + h)[1] - legendre(9, x - h)[1]) / (2 * h)
-    assert slope == pytest.approx(legendre(9, x)[0], abs=1e-7)
-    assert np.allclose(legendre(9, np.zeros(1))[1], 0.0, atol=1e-15)
+    slope = (basis.tabulate(x + h)[1] - basis.tabulate(x - h)[1]) / (2 * h)
+    assert slope == pytest.approx(basis.tabulate(x)[0], abs=1e-7)
+    assert np.allclose(basis.tabulate(np.zeros(1))[1], 0.0, atol=1e-15)
+    seams = np.array([1 / 3, 2 / 3])
+    assert basis.tabulate(seams - 1e-13)[1] == pytest.approx(basis.tabulate(seams + 1e-13)[1], abs=1e-10)
 
 
 @pytest.mark.parametrize("tubes", [2, 3, 4])
@@ -66,7 +70,7 @@ def test_field_and_coordinates_are_inverse():
     finer = Models(energy.materials.robot).energy(energy.materials.domain.D, 9)
     again = energy.space.coordinates(finer.space.field(finer.space.coordinates(field)))
     assert again == pytest.approx(q, abs=1e-12)
-    foreign = type(field)(field.guide, field.boundaries, field.sections, ("other",))
+    foreign = replace(field, topology=("other",))
     assert energy.space.coordinates(foreign) == pytest.approx(q, abs=1e-12)
 
 

@@ -233,8 +233,11 @@ def test_the_solver_serves_all_levels(seed_robot, reference):
         assert answer.status is Status.OK and answer.error_estimate <= 1e-8
         assert np.linalg.norm(answer.tip.position - row["tip_m"]) < 2e-8
         assert answer.torque[1] == pytest.approx(row["torque2_Nm"], rel=1e-6)
-    rough = EquilibriumSolver(seed_robot, tolerance=1e-3, fidelity="torsionless").solve(alpha, D)
+    untwisted = EquilibriumSolver(seed_robot, tolerance=1e-3, fidelity="torsionless")
+    rough = untwisted.solve([0.0, np.radians(60)], D)
     assert rough.status is Status.TOLERANCE_MISSED and not rough.success
+    assert rough.error_estimate > 1e-3
+    assert untwisted.solve(alpha, D).status is Status.NO_STABLE_EQUILIBRIUM
     aligned = EquilibriumSolver(seed_robot, tolerance=1e-6, fidelity="torsionless").solve([0.0, 0.0], D)
     assert aligned.success and aligned.torque == pytest.approx([0.0, 0.0], abs=1e-12)
 
