@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from numpy.typing import NDArray
 
 from ctr_pvs.continuation import State
+from ctr_pvs.equilibria import equilibria
 from ctr_pvs.equilibrium import Equilibrium
 from ctr_pvs.errors import FieldError
 from ctr_pvs.full_solution import FullSolution
@@ -97,6 +98,7 @@ class EquilibriumSolver:
 
         start : "warm" follows the straight path from the last good answer; "cold", and the first solve, the path from
             the relaxed robot at this D.  Angles are not wrapped: 280 deg and -80 deg are different histories.
+            "lowest-energy" has no history: of all stable equilibria that ``equilibria`` finds, the one of least energy.
         budget : seconds that the solve may take; past it the status is TIMEOUT.
 
         The warm start stays the last good one when a solve fails.
@@ -104,11 +106,13 @@ class EquilibriumSolver:
         Raises ``CommandError`` for a command that the robot cannot take, ``FieldError`` for a wrong option; both are
         ``ValueError``.
         """
-        _check_option("start", start, ("warm", "cold"))
+        _check_option("start", start, ("warm", "cold", "lowest-energy"))
         deadline = _deadline(budget)
         alpha, D = self.robot.check_command(alpha, D)
         if self._level == "torsionless":
             return self._torsionless(alpha, D)
+        if start == "lowest-energy":
+            return self._lowest(alpha, D)
         origin, note = self._origin(alpha, D, start)
         if origin is None:
             return self._failure(alpha, D, Status.NOT_CONVERGED, note)
@@ -159,6 +163,17 @@ class EquilibriumSolver:
             coupled = torsion.solution.degrees_of_freedom > 0
             self._last = State(alpha, D, torsion.solution.shape.torques) if coupled else None
         return answer
+
+    def _lowest(self, alpha: Array, D: Array) -> Equilibrium:
+        """The stable equilibrium of least energy, whatever path may lead there."""
+        every = equilibria(self.robot, alpha, D, self.tolerance)
+        if not every.stable:
+            return self._failure(alpha, D, Status.NO_STABLE_EQUILIBRIUM, f"none found: {every.method}")
+        best = every.stable[0]
+        assert isinstance(best.solution, TorsionSolution)
+        refined = Refined(best.solution, best.residual, best.error_estimate, best.iterations)
+        note = f", of least energy among {len(every.stable)}; {every.method}"
+        return self._keep(refined, (), best.iterations, note)
 
     def _torsionless(self, alpha: Array, D: Array) -> Equilibrium:
         """The closed form, with what it neglects told by its error estimate."""

@@ -112,6 +112,7 @@ class Report:
             "last status": equilibrium.status.value,
             "last message": equilibrium.message,
             "stability margin": f"{equilibrium.stability_margin:.6g}",
+            "snap reserve": f"{equilibrium.snap_reserve:.4g}" if equilibrium.success else "",
             "fidelity": equilibrium.fidelity,
             "degrees of freedom": str(equilibrium.degrees_of_freedom) if equilibrium.success else "",
             "error estimate [m]": f"{equilibrium.error_estimate:.3g}",
