@@ -146,9 +146,11 @@ def _angles(models: Models, state: State, energy: TorsionEnergy) -> Array:
     """psi (G, N) [rad] of ``state`` at the nodes of ``energy``: at equal x in equal sections, else at equal s."""
     own = models.energy(state.D, energy.space.degree)
     q = own.space.coordinates(state.torques)
-    if own.materials.domain.topology == energy.materials.domain.topology:
+    if own.space.layout == energy.space.layout:
         return own.angles(q, state.alpha)
     shape = TorsionShape(own.space, state.alpha, q)
+    if own.materials.domain.topology == energy.materials.domain.topology:  # only the panels differ
+        return np.concatenate([shape.angle(node.section, node.rule.x) for node in energy.nodes])
     if not own.materials.domain.n_sections:
         return np.repeat(shape.angle_at_boundaries, len(energy.coupling), axis=0)
     s = np.concatenate([np.zeros(0), *(node.s for node in energy.nodes)])

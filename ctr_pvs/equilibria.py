@@ -2,6 +2,9 @@
 
 With one relative angle the equilibria are the points where the curve of ``tip_curve`` meets the command; none is
 missed.  With more, they come from ``multistart``, which proves nothing; the answer says so.
+
+Either way a rule of Morse's theory can tell that some are missing: the energy grows without bound in all directions of
+q, so the equilibria with an even number of unstable directions are one more than those with an odd number.
 """
 
 from __future__ import annotations
@@ -51,11 +54,13 @@ class Equilibria:
     NO_STABLE_EQUILIBRIUM, and a shape and loads like all others.
 
     complete : True only if the method leaves none out.
+    consistent : False if Morse's rule proves that some are missing.
     method : how they were found, and what that guarantees, in one line.
     """
 
     found: tuple[Equilibrium, ...]
     complete: bool
+    consistent: bool
     method: str
 
     @property
@@ -131,11 +136,22 @@ def _of_many(polish: _Polish) -> Equilibria:
     return _sorted(found, len(fields), False, method)
 
 
-def _sorted(found: list[Equilibrium], expected: int, complete: bool, method: str) -> Equilibria:
+def _sorted(found: list[_Found], expected: int, complete: bool, method: str) -> Equilibria:
+    consistent = sum((-1) ** one.unstable_directions for one in found) == 1
     if len(found) < expected:
         complete = False
         method += f"; not complete: {expected - len(found)} could not be made exact"
-    return Equilibria(tuple(sorted(found, key=lambda one: one.energy)), complete, method)
+    if not consistent:
+        complete = False
+        method += "; some are missing or at a fold, as the numbers of their unstable directions prove"
+    answers = sorted((one.answer for one in found), key=lambda answer: answer.energy)
+    return Equilibria(tuple(answers), complete, consistent, method)
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    answer: Equilibrium
+    unstable_directions: int
 
 
 class _Polish:
@@ -147,12 +163,12 @@ class _Polish:
     def energy(self, degree: int) -> TorsionEnergy:
         return self.models.energy(self.D, degree)
 
-    def exact(self, guesses: list[TorqueField], room: Array) -> list[Equilibrium]:
+    def exact(self, guesses: list[TorqueField], room: Array) -> list[_Found]:
         """The equilibria next to ``guesses``, none farther than ``room`` (m,) [rad]; those that fail are left out."""
         found = [self._one(guess, float(reach)) for guess, reach in zip(guesses, room, strict=True)]
         return [one for one in found if one is not None]
 
-    def _one(self, guess: TorqueField, room: float) -> Equilibrium | None:
+    def _one(self, guess: TorqueField, room: float) -> _Found | None:
         before, best, spent = None, None, 0
         integration = LOOSER * INTEGRATION_SHARE * self.tolerance
         for degree in DEGREES:
@@ -174,7 +190,7 @@ class _Polish:
             before = tip
         return best
 
-    def _told(self, solution: TorsionSolution, residual: float, estimate: float, spent: int) -> Equilibrium:
+    def _told(self, solution: TorsionSolution, residual: float, estimate: float, spent: int) -> _Found:
         margin = solution.stability_margin()
         status, message = Status.OK, "stable equilibrium"
         if not margin > 0.0:
@@ -182,7 +198,7 @@ class _Polish:
         elif estimate > self.tolerance:
             status = Status.TOLERANCE_MISSED
             message = f"tip error about {estimate:.1e} m, {self.tolerance:.1e} m were asked for"
-        return Equilibrium(
+        answer = Equilibrium(
             self.alpha,
             self.D,
             status,
@@ -194,6 +210,15 @@ class _Polish:
             iterations=spent,
             solution=solution,
         )
+        return _Found(answer, unstable_directions(solution))
+
+
+def unstable_directions(solution: TorsionSolution) -> int:
+    """Number of negative eigenvalues of the energy Hessian."""
+    if solution.energy.n == 0:
+        return 0
+    _, hessian = solution.energy.derivatives(solution.q, solution.alpha)
+    return int((np.linalg.eigvalsh(hessian) < 0.0).sum())
 
 
 def stationary(energy: TorsionEnergy, alpha: Array, q: Array, room: float) -> tuple[Array | None, float, int]:
@@ -202,6 +227,8 @@ def stationary(energy: TorsionEnergy, alpha: Array, q: Array, room: float) -> tu
     None if it does not converge, or leaves ``q`` by more than ``room`` [rad].
     """
     start, limit, residual = q, residual_limit(alpha), np.inf
+    if energy.n == 0:
+        return q, 0.0, 0
     for steps in range(NEWTON_STEPS):
         gradient, hessian = energy.derivatives(q, alpha)
         residual = twist_size(energy, gradient)

@@ -129,11 +129,12 @@ class TipIntegral:
     def _integrate(self, section: PairSection, state: Array, x: Array) -> Array:
         length, index = section.length, section.index
         turn, shape = section.compliance * self.unit * length, state.shape
+        fixed = self.pair.constant_pull(section)
 
         def rates(place: float, flat: Array) -> Array:
             theta, torque, theta_rate, torque_rate = flat.reshape(shape)
-            pull = self.pair.pull(index, np.array([section.start + place * length]))[0] * (length / self.unit)
-            moment = pull * np.exp(1j * theta)
+            pull = fixed if fixed is not None else self.pair.pull(index, np.array([section.start + place * length]))[0]
+            moment = pull * (length / self.unit) * np.exp(1j * theta)
             return np.concatenate([turn * torque, moment.imag, turn * torque_rate, moment.real * theta_rate])
 
         found = solve_ivp(rates, (1.0, 0.0), state.ravel(), method="DOP853", t_eval=x[::-1], rtol=ACCURACY, atol=FINEST)

@@ -23,6 +23,9 @@ from ctr_pvs.sections import piecewise_domain
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
+#: Relative differences below this are those of rounding.
+ROUNDING = 1e-13
+
 
 @dataclass(frozen=True)
 class PairSection:
@@ -66,6 +69,12 @@ class TubePair:
         bending, kappa = self.materials.bending[m], self.materials.pre_curvature(m, s)
         stiffness = bending[self.a] * bending[self.b] / bending.sum()
         return np.asarray(stiffness * kappa[..., self.a].conj() * kappa[..., self.b])
+
+    def constant_pull(self, section: PairSection) -> complex | None:
+        """c [N] if it is the same all along the section, up to rounding; else None."""
+        s = section.start + section.length * np.linspace(0.0, 1.0, 12)
+        pulls = self.pull(section.index, s)
+        return complex(pulls[0]) if np.abs(pulls - pulls[0]).max() <= ROUNDING * abs(pulls[0]) else None
 
 
 def materials_at(robot: Robot, D: ArrayLike) -> Materials:

@@ -102,6 +102,11 @@ class TwistSpace:
         self.blocks = self._blocks()
         self.n = self.blocks[-1].columns.stop if self.blocks else 0
 
+    @property
+    def layout(self) -> tuple[object, ...]:
+        """Equal for two spaces with the same sections, panels and degrees: their nodes correspond."""
+        return (self.materials.domain.topology, tuple(block.basis for block in self.blocks))
+
     def basis(self, m: int) -> TwistBasis:
         """The functions that carry the torques of section m: panels where coupling is strong, constants where none
         is."""

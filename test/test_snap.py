@@ -297,3 +297,17 @@ def test_D_at_its_limits(seed_robot, D):
     answer = EquilibriumSolver(seed_robot, tolerance=1e-7).solve([0.0, 2.0], D)
     assert answer.success and answer.stability_margin > 0.0
     assert np.all(np.isfinite(answer.force_interval)) and abs(answer.torque.sum()) < 1e-12
+
+
+def test_sliding_into_strong_coupling_changes_panels():
+    """Pushing out until the overlap needs a second panel of polynomials, and back: the branch goes on."""
+    robot, D = two_tubes(30.0, 0.5)
+    inside = [0.6 * robot.tubes[0].length] * 2
+    solver = EquilibriumSolver(robot, tolerance=1e-7)
+    first = solver.solve([0.0, 1.0], inside)
+    out = solver.follow([0.0, 1.0], D)
+    panels = [max(block.basis.panels for block in a.solution.energy.space.blocks) for a in (first, out)]
+    assert panels[0] == 1 < panels[1]
+    back = solver.follow([0.0, 1.0], inside)
+    assert first.success and out.success and back.success
+    assert back.tip.position == pytest.approx(first.tip.position, abs=1e-9)
