@@ -19,6 +19,11 @@ from ctr_pvs import Equilibrium
 from ctr_pvs import EquilibriumSolver
 from ctr_pvs import Status
 from ctr_pvs import load_robot
+from ctr_pvs.cli_stability import declare_stability
+from ctr_pvs.cli_words import UsageError
+from ctr_pvs.cli_words import is_number
+from ctr_pvs.cli_words import number
+from ctr_pvs.cli_words import whole_number
 from ctr_pvs.errors import FieldError
 from ctr_pvs.errors import RobotFileError
 from ctr_pvs.figures import PictureError
@@ -40,10 +45,6 @@ EXIT_CODES = (
 
 MOST_POSES = 100_000
 PICTURES = Path("reproduce")
-
-
-class UsageError(ValueError):
-    """Arguments that cannot be meant. The message is one line."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -80,14 +81,14 @@ def _declare_solve(subcommands: argparse._SubParsersAction[_Parser]) -> None:
     )
     solve.add_argument("robot", metavar="ROBOT", help="robot file (YAML)")
     solve.add_argument(
-        "--alpha", nargs="+", type=_number, required=True, metavar="A", help="base rotation of each tube [rad]"
+        "--alpha", nargs="+", type=number, required=True, metavar="A", help="base rotation of each tube [rad]"
     )
     solve.add_argument(
-        "--D", nargs="+", type=_number, required=True, metavar="D", help="base-to-orifice distance of each tube [m]"
+        "--D", nargs="+", type=number, required=True, metavar="D", help="base-to-orifice distance of each tube [m]"
     )
     solve.add_argument("--degrees", action="store_true", help="--alpha is in degrees; text output shows degrees too")
     solve.add_argument(
-        "--tolerance", type=_number, default=1e-5, metavar="M", help="largest error of the tip [m] (%(default)g)"
+        "--tolerance", type=number, default=1e-5, metavar="M", help="largest error of the tip [m] (%(default)g)"
     )
     solve.add_argument(
         "--fidelity",
@@ -108,7 +109,11 @@ def _declare_solve(subcommands: argparse._SubParsersAction[_Parser]) -> None:
         help="insertion forces: dE/dD, or eq. (41) of Renda et al. 2021",
     )
     solve.add_argument(
-        "--poses", type=_pose_count, default=51, metavar="N", help="poses along the backbone, in --json (%(default)s)"
+        "--poses",
+        type=whole_number(2, MOST_POSES),
+        default=51,
+        metavar="N",
+        help="poses along the backbone, in --json (%(default)s)",
     )
     solve.add_argument("--json", action="store_true", help="print the answer as JSON, in SI units")
     solve.set_defaults(run=_solve)
@@ -185,7 +190,7 @@ def _parser() -> _Parser:
         epilog=EXIT_CODES,
     )
     subcommands = parser.add_subparsers(metavar="SUBCOMMAND", required=True)
-    for declare in (_declare_solve, _declare_reproduce):
+    for declare in (_declare_solve, _declare_reproduce, declare_stability):
         declare(subcommands)
     return parser
 
@@ -199,29 +204,8 @@ def _shielded(words: Sequence[str]) -> list[str]:
     shielded: list[str] = []
     for word in words:
         option, equals, value = word.partition("=")
-        if option.startswith("--") and equals and _is_number(value):
+        if option.startswith("--") and equals and is_number(value):
             shielded += [option, f" {value}"]
         else:
-            shielded.append(f" {word}" if word.startswith("-") and _is_number(word) else word)
+            shielded.append(f" {word}" if word.startswith("-") and is_number(word) else word)
     return shielded
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
-
-
-def _number(text: str) -> float:
-    if not _is_number(text) or not math.isfinite(float(text)):
-        raise argparse.ArgumentTypeError(f"expected a finite number, got {text.strip()!r}")
-    return float(text)
-
-
-def _pose_count(text: str) -> int:
-    value = _number(text)
-    if value != int(value) or not 2 <= value <= MOST_POSES:
-        raise argparse.ArgumentTypeError(f"expected a whole number from 2 to {MOST_POSES}, got {text.strip()!r}")
-    return int(value)

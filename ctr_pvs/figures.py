@@ -50,7 +50,7 @@ def save_fig2(branches: dict[str, Branch], path: Path) -> None:
     low, high = points.min(axis=0) - ROOM, points.max(axis=0) + ROOM
     heights = PANEL_WIDTH * (high - low) / (high[0] - low[0])
     width, height = LEFT + PANEL_WIDTH + TOP, BOTTOM + heights[1] + BETWEEN + heights[2] + TOP
-    figure = _figure((width, height))
+    figure = empty_figure((width, height))
     for row, bottom in ((1, BOTTOM), (2, BOTTOM + heights[1] + BETWEEN)):
         place = (LEFT / width, bottom / height, PANEL_WIDTH / width, heights[row] / height)
         axes = figure.add_axes(place, xlim=(low[0], high[0]), ylim=(low[row], high[row]))
@@ -82,7 +82,7 @@ def _draw_branches(axes: Axes, branches: dict[str, Branch], row: int) -> None:
 
 def save_fig4(sweeps: dict[str, Sweep], path: Path) -> None:
     """The sweeps of Fig. 4: backbones in the quadratic basis, coloured by rotation, and converged tips as dots."""
-    figure = _figure((13.0, 5.0))
+    figure = empty_figure((13.0, 5.0))
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
@@ -115,7 +115,7 @@ def _set_box(axes: Any, low: Array, high: Array) -> None:
     axes.set_box_aspect(high - low, zoom=1.1)
 
 
-def _figure(size: tuple[float, float]) -> Figure:
+def empty_figure(size: tuple[float, float]) -> Figure:
     """An empty figure of ``size`` [in] that needs no display."""
     try:
         from matplotlib.figure import Figure
