@@ -13,6 +13,7 @@ from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import LinAlgError
 
 from ctr_pvs.energy import TorsionEnergy
 from ctr_pvs.models import Models
@@ -107,7 +108,11 @@ def _tangent(models: Models, state: State, path: CommandPath, degree: int) -> tu
     """The torque field at this degree, its rate along the path, and how fast [rad] tubes turn against each other."""
     energy = models.energy(state.D, degree)
     q = energy.space.coordinates(state.torques)
-    rates = Sensitivity(energy, state.alpha, q, path.alpha_rate[:, None], path.D_rate[:, None])
+    directions = path.alpha_rate[:, None], path.D_rate[:, None]
+    try:
+        rates = Sensitivity(energy, state.alpha, q, *directions)
+    except LinAlgError:  # cut down to this degree the state is just past its fold: set out without a tangent
+        rates = Sensitivity(energy, state.alpha, q, *directions, twists=False)
     turning = energy.angle_map @ rates.q_rate[:, 0] + path.alpha_rate
     speed = float(np.ptp(turning, axis=1).max(initial=0.0)) if turning.size else 0.0
     return rates.torques, rates.field_rate(), speed

@@ -148,8 +148,7 @@ class TorsionEnergy:
         """
         total = moments.sum(axis=1).conj()
         diagonal = self.coupling[:, None] * (total[:, None] * moments).real
-        p = directions.shape[2]
-        flat = directions.reshape(-1, p)
+        flat = directions.reshape(diagonal.size, directions.shape[2])
         root = np.sqrt(self.coupling)[:, None]
         along = np.einsum("gn,gnp->gp", root * moments.real, directions)
         across = np.einsum("gn,gnp->gp", root * moments.imag, directions)

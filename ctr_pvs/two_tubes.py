@@ -6,12 +6,13 @@ equation, with the guide and whatever lies straight before the overlap as a twis
     theta'' = lambda sin(theta),      theta(0) = alpha + b theta'(0),      theta'(1) = 0,
     lambda = L_c^2 kappa_1 kappa_2 [K_1 K_2 / sum K] (1/GJ_1 + 1/GJ_2).
 
-The equation, and that the rotation at which such a pair snaps follows from it: P. E. Dupont, J. Lock, B. Itkowitz,
-E. Butler, "Design and Control of Concentric-Tube Robots", IEEE Trans. Robotics 26(2), 2010; its solution in elliptic
-functions: R. Xu, S. F. Atashzar, R. V. Patel, "Kinematic Instability in Concentric-Tube Robots: Modeling and Analysis",
-IEEE BioRob 2014; the parameters, the snap-free test and the stability function at theta = pi: H. B. Gilbert,
-R. J. Hendrick, R. J. Webster III, "Elastic Stability of Concentric Tube Robots: A Stability Measure and Design Test",
-IEEE Trans. Robotics 32(1), 2016.
+The equation, its solution for two tubes of constant curvature and the snap that follows from it: P. E. Dupont, J. Lock,
+E. Butler, "Torsional Kinematic Model for Concentric Tube Robots", ICRA 2009, and with B. Itkowitz, "Design and Control
+of Concentric-Tube Robots", IEEE Trans. Robotics 26(2), 2010.  With straight lengths before the overlap: R. Xu,
+S. F. Atashzar, R. V. Patel, "Kinematic Instability in Concentric-Tube Robots: Modeling and Analysis", BioRob 2014.  The
+two parameters, the snap-free test and the stability function at theta = pi: H. B. Gilbert, R. J. Hendrick,
+R. J. Webster III, "Elastic Stability of Concentric Tube Robots: A Stability Measure and Design Test", IEEE Trans.
+Robotics 32(1), 2016.
 
 All equilibria are one curve alpha(theta_1), theta_1 = theta(1) the angle at the tip.  With k = cos(theta_1 / 2),
 k' = sin(theta_1 / 2), u = sqrt(lambda) and Jacobi's functions of u at modulus k,

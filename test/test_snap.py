@@ -311,3 +311,22 @@ def test_sliding_into_strong_coupling_changes_panels():
     back = solver.follow([0.0, 1.0], inside)
     assert first.success and out.success and back.success
     assert back.tip.position == pytest.approx(first.tip.position, abs=1e-9)
+
+
+def test_setting_out_from_the_very_edge_never_raises():
+    """From states within 1e-4 .. 1e-9 rad of a fold of strongly coupled tubes, in all directions: answers, no
+    exceptions."""
+    robot, D = two_tubes(12.0, 0.3)
+    probe = EquilibriumSolver(robot, tolerance=1e-8)
+    probe.solve([0.0, 0.0], D)
+    fold = probe.follow([0.0, 12.0], D).snaps[0].alpha[1]
+    for gap in 10.0 ** np.arange(-9, -3):
+        for step in (-0.5, -1e-3, gap / 2, 2 * gap, 0.5):
+            solver = EquilibriumSolver(robot, tolerance=1e-8)
+            solver.solve([0.0, 0.0], D)
+            edge = solver.follow([0.0, fold - gap], D)
+            moved = solver.follow([0.0, fold - gap + step], D)
+            assert edge.success and moved.success, (edge.message, moved.message)
+            assert moved.stability_margin > 0.0
+            if step > 2 * gap:
+                assert moved.status is Status.SNAP or edge.status is Status.SNAP
