@@ -33,6 +33,11 @@ from ctr_pvs.travel import travel
 
 Array = NDArray[np.float64]
 
+#: With less margin than this an answer is at the edge of a fold.
+DELICATE = 0.1
+#: Index of the degree at which a delicate journey is believed even if it does not agree with the one before.
+MOST_REPEATS = 3
+
 FIDELITIES = ("auto", "torsionless", "torsion", "full")
 FORCE_MODELS = ("virtual_work", "renda2021")
 
@@ -132,16 +137,27 @@ class EquilibriumSolver:
         return State(begin, D, energy.space.field(relaxed.q)), note
 
     def _answer(self, origin: State, alpha: Array, D: Array, deadline: float, note: str) -> Equilibrium:
-        """Travel at the lowest degree that keeps the branch up to the converged model, then refine."""
-        iterations = 0
+        """Travel at the lowest degree that keeps the branch up to the converged model, then refine.
+
+        Folds lie a little elsewhere at a low degree.  A journey through one, or to the edge of one, is therefore made
+        again at the next degree, until two agree.
+        """
+        iterations, before = 0, None
         for index, degree in enumerate(DEGREES[:-1]):
             journey = travel(self._models, origin, alpha, D, degree, deadline)
             iterations += journey.iterations
+            if journey.end is TravelEnd.NO_LANDING and index < len(DEGREES) - 2:
+                continue  # a state at the edge of a fold may lie beyond the fold of a lower degree
             if journey.end is not TravelEnd.REACHED:
                 return self._failure(alpha, D, _STATUS[journey.end], _stopped(journey), iterations)
             refined = refine_torsion(self._models, journey.state, DEGREES[index:], self.tolerance)
-            if refined is not None:
-                return self._keep(refined, journey.snaps, iterations + refined.iterations, note)
+            if refined is None:
+                continue
+            iterations += refined.iterations
+            delicate = bool(journey.snaps) or refined.solution.stability_margin() < DELICATE
+            if not delicate or index == MOST_REPEATS or (before is not None and journey.agrees_with(before)):
+                return self._keep(refined, journey.snaps, iterations, note)
+            before = journey
         message = "the refined model lost the branch that the coarse one followed: a fold is very near this command"
         return self._failure(alpha, D, Status.NOT_CONVERGED, message, iterations)
 

@@ -22,6 +22,10 @@ Array = NDArray[np.float64]
 MOST_SNAPS = 100
 
 
+#: Folds of two journeys closer than this [rad], [m] are one.
+SAME_FOLD = 1e-7
+
+
 class TravelEnd(Enum):
     """How a journey ended; the value is a reason for people."""
 
@@ -40,6 +44,15 @@ class Travelled:
     t: float
     snaps: tuple[Snap, ...]
     iterations: int
+
+    def agrees_with(self, other: Travelled) -> bool:
+        """True if both snapped at the same places of the path."""
+        if len(self.snaps) != len(other.snaps):
+            return False
+        return all(
+            max(np.abs(a.alpha - b.alpha).max(), np.abs(a.D - b.D).max()) < SAME_FOLD
+            for a, b in zip(self.snaps, other.snaps, strict=True)
+        )
 
 
 def travel(models: Models, start: State, alpha: Array, D: Array, degree: int, deadline: float) -> Travelled:

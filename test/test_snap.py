@@ -16,6 +16,7 @@ from ctr_pvs import Segment
 from ctr_pvs import Status
 from ctr_pvs import Tube
 from ctr_pvs.models import Models
+from ctr_pvs.two_tubes import TwoTubes
 
 FULL, PARTIAL = [0.0935, 0.2085], [0.0935, 0.1705]
 
@@ -208,13 +209,14 @@ def test_one_large_step_is_many_small_ones(seed):
 HARD = {
     "long guides, b = 10": lambda: two_tubes(1.0, 10.0),
     "lambda = 10": lambda: two_tubes(10.0, 0.0),
+    "low GJ, lambda = 30": lambda: two_tubes(30.0, 0.1),
     "low GJ, lambda = 100": lambda: two_tubes(100.0, 0.1),
     "near-rigid GJ": lambda: two_tubes(1e-6, 0.5),
     "no curvature": lambda: two_tubes(0.0, 0.5),
 }
 
 
-@pytest.mark.parametrize("name", HARD)
+@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.soak) if "100" in n else n for n in HARD])
 def test_hard_cases_turn_through_everything(name):
     """A whole turn and back in uneven steps: every answer is stable and flagged, or fails with a reason."""
     robot, D = HARD[name]()
@@ -330,3 +332,17 @@ def test_setting_out_from_the_very_edge_never_raises():
             assert moved.stability_margin > 0.0
             if step > 2 * gap:
                 assert moved.status is Status.SNAP or edge.status is Status.SNAP
+
+
+@pytest.mark.parametrize(
+    ("lam", "b"), [(3.0, 0.0), (5.0, 0.0), (8.0, 0.0), (10.0, 0.0), (1.0, 1.0), (2.0, 0.5), (12.0, 1.0)]
+)
+def test_snaps_are_where_the_closed_form_has_them(lam, b):
+    """The place of a snap does not depend on the tolerance asked of the tip: alpha to 1e-6 rad."""
+    robot, D = two_tubes(lam, b)
+    exact = TwoTubes(lam, max(b, 1e-6)).snap.alpha  # a robot needs some straight tube: 1e-7 m of it
+    for tolerance in (1e-3, 1e-6):
+        solver = EquilibriumSolver(robot, tolerance=tolerance)
+        solver.solve([0.0, 0.0], D)
+        (snap, *_) = solver.follow([0.0, exact + 0.3], D).snaps
+        assert snap.alpha[1] == pytest.approx(exact, abs=1e-6)
