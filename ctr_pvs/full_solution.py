@@ -105,8 +105,12 @@ class FullSolution(Solution):
         return self.energy.value(self.q) + float(self.energy.materials.straightening_energy.sum())
 
     def stability_margin(self) -> float:
-        """The margin of the twist after bending, which is always stiff, has taken its own minimum (Schur
-        complement)."""
+        """At this basis, and below 1 no more than that of the `torsion` limit: a basis is optimistic."""
+        own = self._margin_here()
+        return own if own == 1.0 or self.limit is None else min(own, self.limit.stability_margin())
+
+    def _margin_here(self) -> float:
+        """The margin of the twist after bending, always stiff, has taken its own minimum (Schur complement)."""
         hessian = self.energy.hessian(self.q)
         values, vectors = eigh(self.energy.torsion_metric)
         twists = values > 1e-12 * max(float(values.max(initial=0.0)), 1e-300)
