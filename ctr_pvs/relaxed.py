@@ -70,8 +70,9 @@ def _minimum(energy: TorsionEnergy, start: Array) -> tuple[Array, Array] | None:
     joint = _JointEnergy(energy)
     x = joint.pack(np.zeros(energy.n), start)
     for _ in range(3):
+        # Not "trust-exact": scipy 1.11's can loop for ever on a singular Hessian.
         found = minimize(
-            joint.value, x, jac=joint.gradient, hess=joint.hessian, method="trust-exact", options={"gtol": 1e-9}
+            joint.value, x, jac=joint.gradient, hess=joint.hessian, method="trust-ncg", options={"gtol": 1e-9}
         )
         x = found.x
         lowest, vectors = np.linalg.eigh(joint.hessian(x))
