@@ -164,7 +164,7 @@ def test_no_equilibrium_is_missed(seed):
     found = tubes.equilibria(alpha)
     assert tubes.alpha(found) == pytest.approx(np.full(len(found), alpha), abs=1e-10)
     dense = np.linspace(found[0] - 1.0, found[-1] + 1.0, 400_001)
-    assert np.count_nonzero(np.diff(np.sign(tubes.alpha(dense) - alpha))) == len(found)
+    assert np.count_nonzero(np.diff(tubes.alpha(dense) > alpha)) == len(found)  # a sample may hit a root
 
 
 @pytest.mark.parametrize(("D", "expected"), FIG4_FOLDS)
