@@ -23,7 +23,7 @@ from ctr_pvs.shape import Shape
 
 Array = NDArray[np.float64]
 
-#: Gauss points over the overlap.
+#: Gauss points on each panel of the overlap.
 NODES = 32
 
 
@@ -43,7 +43,7 @@ def printed_forces(shape: Shape) -> Array:
     check_renda2021(shape.materials.robot)
     overlap = _overlap(shape)
     stiffness, inner = shape.materials.bending[overlap], 1
-    rule = gauss_legendre(NODES)
+    rule = gauss_legendre(NODES, shape.panels(overlap))
     x = rule.x
     k, (k_orifice, k_end) = shape.curvature(overlap, x), shape.curvature(overlap, np.array([0.0, 1.0]))
     s = shape.domain.boundaries[overlap] + x * shape.domain.lengths[overlap]

@@ -53,6 +53,10 @@ class Shape(ABC):
     def angle_at_boundaries(self) -> Array:
         """psi (M + 1, N) [rad] at the section boundaries; past its tip a tube keeps its last angle."""
 
+    def panels(self, m: int) -> int:
+        """Number of equal panels of section m on which the fields are smooth: quadrature must not cross their seams."""
+        return 1
+
     @cached_property
     def leader(self) -> int:
         """The tube that reaches farthest, the innermost of equals: poses carry its material frame."""
@@ -98,6 +102,9 @@ class TorsionShape(Shape):
         psi = np.broadcast_to(self.angle_at_boundaries[m], (len(x), len(self.alpha)))
         twist = self.torques.bases[m].tabulate(x)[1] @ self.torques.sections[m].T
         return psi + twist * self._compliance(m)
+
+    def panels(self, m: int) -> int:
+        return self.torques.bases[m].panels
 
     def twist_rate(self, m: int, x: Array) -> Array:
         torque = self.torques.bases[m].tabulate(x)[0] @ self.torques.sections[m].T

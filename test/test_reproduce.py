@@ -221,7 +221,7 @@ def test_no_geometry_gives_row_d(rows):
     assert row.ours == pytest.approx(0.301, abs=5e-4) and row.seed == 0.28
     assert related_force(0.1175) > 0.285 + 0.01
     assert related_torque(related_force(0.1)) == pytest.approx(0.1)
-    assert rows["table2_d_relation_error"].ours < 1e-7
+    assert rows["table2_d_relation_error"].ours < 1e-8
 
 
 # --- telling it -------------------------------------------------------------------------------------------------------
