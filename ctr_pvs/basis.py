@@ -66,7 +66,13 @@ class TwistBasis:
         return gauss_legendre(self.degree + 3, self.panels)
 
     def tabulate(self, x: Array) -> tuple[Array, Array]:
-        """The functions at ``x`` (g,), and their integrals from 0: two arrays (g, size), panel by panel."""
+        """The functions at ``x`` (g,), and their integrals from 0: two arrays (g, size), panel by panel; read-only.
+
+        Gauss points and ends of sections come again with every base position, so the last tables are kept.
+        """
+        return _tabulated(self, x.tobytes())
+
+    def _tabulate(self, x: Array) -> tuple[Array, Array]:
         if self.panels == 1:
             return legendre(self.degree, x)
         panel = np.minimum((x * self.panels).astype(int), self.panels - 1)
@@ -80,3 +86,11 @@ class TwistBasis:
         values[here, panel] = local * root
         integrals[here, panel] = inside / root
         return values.reshape(len(x), -1), integrals.reshape(len(x), -1)
+
+
+@lru_cache(maxsize=256)
+def _tabulated(basis: TwistBasis, x: bytes) -> tuple[Array, Array]:
+    values, integrals = basis._tabulate(np.frombuffer(x))
+    for table in (values, integrals):
+        table.flags.writeable = False
+    return values, integrals

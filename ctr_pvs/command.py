@@ -43,6 +43,7 @@ class CommandBounds:
         D_limits: Sequence[Range | None],
     ) -> None:
         self._names = tuple(names)
+        self._shape = (len(names),)
         self._lengths = tuple(lengths)
         self._alpha_limits, self._D_limits = tuple(alpha_limits), tuple(D_limits)
         whole = (-LARGEST_ALPHA, LARGEST_ALPHA)
@@ -59,6 +60,8 @@ class CommandBounds:
 
     def check(self, alpha: ArrayLike, D: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """See `Robot.check_command`."""
+        if isinstance(alpha, np.ndarray) and isinstance(D, np.ndarray) and self._plainly_good(alpha, D):
+            return alpha.copy(), D.copy()
         alpha, D = self._array("alpha", alpha), self._array("D", D)
         previous = -np.inf
         settled = True  # nothing rests on the slack
@@ -74,6 +77,19 @@ class CommandBounds:
                 settled = False
             previous = depth
         return alpha, D if settled else self._into_reach(D)
+
+    def _plainly_good(self, alpha: NDArray[np.float64], D: NDArray[np.float64]) -> bool:
+        """True for what nearly every command is: arrays of floats, all well within the bounds."""
+        if alpha.dtype != np.float64 or D.dtype != np.float64 or alpha.shape != self._shape or D.shape != self._shape:
+            return False
+        previous = 0.0
+        for angle, depth, (lowest, highest), (low, high) in zip(
+            alpha.tolist(), D.tolist(), self._alpha_ranges, self._D_ranges, strict=True
+        ):
+            if not (lowest <= angle <= highest and low <= depth <= high and previous <= depth):
+                return False
+            previous = depth
+        return True
 
     def clamp(self, alpha: ArrayLike, D: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64], list[str]]:
         """See `Robot.clamp_command`."""

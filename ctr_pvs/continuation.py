@@ -18,6 +18,7 @@ from scipy.linalg import LinAlgError
 from ctr_pvs.energy import TorsionEnergy
 from ctr_pvs.models import Models
 from ctr_pvs.sensitivity import Sensitivity
+from ctr_pvs.serving import LARGEST_TURN
 from ctr_pvs.shape import TorsionShape
 from ctr_pvs.solve import newton
 from ctr_pvs.stability import stability_margin
@@ -30,8 +31,6 @@ SHORTEST_STEP = 1e-13
 #: A state with less margin that cannot be left by a step is at the branch's end: at a fold the margin falls with the
 #: square root of what is left, so this is about 1e-10 rad before it.
 AT_THE_FOLD = 1e-5
-#: Largest predicted change [rad] of the angle between two tubes in one step: beyond, a tangent says little.
-LARGEST_TURN = 1.0
 #: Largest slide in one step, as a share of the longest tube: the tubes could couple more in between than at either end.
 LARGEST_SLIDE = 0.05
 

@@ -48,7 +48,7 @@ class PairForm:
             return True
         a, b = self.angles(psi), self.angles(other)
         slack = WIDER * np.abs(b - a) + AT_LEAST
-        lowest = _least_cosine(np.minimum(a, b) - slack, np.maximum(a, b) + slack)
+        lowest = least_cosine(np.minimum(a, b) - slack, np.maximum(a, b) + slack)
         flat = self.map.reshape(-1, self.n)
         bound = (flat * (self.amplitude * lowest).reshape(-1, 1)).T @ flat
         bound[np.diag_indices(self.n)] += 1.0
@@ -59,8 +59,8 @@ class PairForm:
         return True
 
 
-def _least_cosine(low: Array, high: Array) -> Array:
-    """Least value of cos on [low, high]."""
+def least_cosine(low: Array, high: Array) -> Array:
+    """Least value of cos on [low, high], each (...)."""
     # An odd multiple of pi lies inside if the next one from low on does.
     turning = np.pi * (2.0 * np.ceil((low / np.pi - 1.0) / 2.0) + 1.0)
     return np.where(turning <= high, -1.0, np.minimum(np.cos(low), np.cos(high)))

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from ctr_pvs.basis import GaussRule
 from ctr_pvs.basis import gauss_legendre
 from ctr_pvs.materials import Materials
+from ctr_pvs.twist import Degrees
 from ctr_pvs.twist import TwistSpace
 
 Array = NDArray[np.float64]
@@ -60,12 +61,12 @@ class SectionNodes:
 
 
 class TorsionEnergy:
-    """E at one D and one polynomial degree, as a function of q (n,) and alpha (N,).
+    """E at one D and one choice of polynomial degrees, as a function of q (n,) and alpha (N,).
 
     n : number of unknowns; nodes : the coupled sections' Gauss points; angle_map (G, N, n) : psi = alpha + A q there.
     """
 
-    def __init__(self, materials: Materials, degree: int) -> None:
+    def __init__(self, materials: Materials, degree: Degrees) -> None:
         self.materials = materials
         self.space = TwistSpace(materials, degree)
         self.n = self.space.n

@@ -208,7 +208,7 @@ class _Polish:
             error_estimate=estimate,
             residual=residual,
             iterations=spent,
-            solution=solution,
+            source=solution,
         )
         return _Found(answer, unstable_directions(solution))
 

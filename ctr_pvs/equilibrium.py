@@ -13,10 +13,14 @@ from numpy.typing import NDArray
 from ctr_pvs.actuation import Loads
 from ctr_pvs.backbone import Backbone
 from ctr_pvs.backbone import Pose
-from ctr_pvs.backbone import bishop_frames
-from ctr_pvs.backbone import material_poses
+from ctr_pvs.backbone import poses
+from ctr_pvs.backbone import tip_pose
+from ctr_pvs.continuation import State
+from ctr_pvs.pieces import Piece
 from ctr_pvs.renda2021 import printed_forces
+from ctr_pvs.serve import Position
 from ctr_pvs.shape import Shape
+from ctr_pvs.shape import TorsionShape
 from ctr_pvs.snap import Snap
 from ctr_pvs.solution import Solution
 from ctr_pvs.status import NoEquilibriumError
@@ -25,15 +29,16 @@ from ctr_pvs.status import Status
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Equilibrium:
     """What came of one command.
 
     alpha, D : (N,) the command [rad], [m].
     status, message : the outcome, in one word and in one line; ``success`` is true for "ok" and "snap".
     fidelity : model level; degrees_of_freedom : number of unknowns solved for.
-    error_estimate : estimated tip error of discretisation and integration [m]; NaN without an equilibrium.
-    residual : largest twist [rad] that the unbalanced torque left after the solve would cause; NaN likewise.
+    error_estimate : bound of the motion [m] of any point of the backbone, the tip among them, that more unknowns would
+        bring (see ``serving``), plus what integration may add; NaN without an equilibrium.
+    residual : bound of the twist [rad] that the unbalanced torque left after the solve would cause; NaN likewise.
     iterations : Newton iterations spent on the way from the start to this answer.
     snaps : the snaps on the way, each with its place on the path, the states before and after, and the energy released.
 
@@ -51,7 +56,7 @@ class Equilibrium:
     error_estimate: float = np.nan
     residual: float = np.nan
     iterations: int = 0
-    solution: Solution | None = field(default=None, repr=False)
+    source: Position | Solution | None = field(default=None, repr=False)
     snaps: tuple[Snap, ...] = field(default=(), repr=False)
 
     @property
@@ -61,6 +66,17 @@ class Equilibrium:
     @property
     def degrees_of_freedom(self) -> int:
         return self._solved.degrees_of_freedom
+
+    @cached_property
+    def solution(self) -> Solution | None:
+        """The state that all outputs are read from."""
+        return self.source.solution if isinstance(self.source, Position) else self.source
+
+    @property
+    def state(self) -> State:
+        """alpha, D and torques, for those who follow paths (``continuation``)."""
+        assert isinstance(self._solved.shape, TorsionShape)
+        return State(self.alpha, self.D, self._solved.shape.torques)
 
     @property
     def _solved(self) -> Solution:
@@ -76,8 +92,11 @@ class Equilibrium:
     @cached_property
     def tip(self) -> Pose:
         """Pose of the far end: material frame of the tube that reaches farthest (ties: the innermost)."""
-        end = self.backbone_at(np.array([0.0, self.shape.domain.length]))
-        return Pose(end.position[-1], end.orientation[-1])
+        return tip_pose(self._pieces)
+
+    @cached_property
+    def _pieces(self) -> list[Piece]:
+        return self._solved.pieces(self.integration_tolerance)
 
     def backbone(self, n: int) -> Backbone:
         """``n`` >= 2 poses at equal spacing from the orifice to the tip; x is the tangent, roll that of ``tip``."""
@@ -87,14 +106,13 @@ class Equilibrium:
 
     def backbone_at(self, s: Array) -> Backbone:
         """Poses at increasing arc lengths ``s`` (g,) [m] between 0 and the robot's length."""
-        frames = bishop_frames(self.shape, s, self.integration_tolerance)
-        return material_poses(self.shape, self.shape.leader, s, frames)
+        return poses(self._pieces, s)
 
     def tube_backbone(self, tube: int, n: int) -> Backbone:
         """``n`` >= 2 poses of one tube's material frame from the orifice to its own tip; ``tube`` counts from 0."""
         end = max(0.0, float(self.shape.materials.robot.tubes[tube].length - self.D[tube]))
         s = np.linspace(0.0, min(end, self.shape.domain.length), n)
-        return material_poses(self.shape, tube, s, bishop_frames(self.shape, s, self.integration_tolerance))
+        return poses(self._solved.pieces(self.integration_tolerance, tube), s)
 
     @property
     def integration_tolerance(self) -> float:

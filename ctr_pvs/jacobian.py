@@ -31,20 +31,19 @@ def tip_jacobian(energy: TorsionEnergy, shape: TorsionShape, tolerance: float) -
     rates = Sensitivity(energy, shape.alpha, shape.q, *directions, twists=shape.twists)
     nodes = energy.all_nodes
     places = np.concatenate([np.zeros(1), *(node.s for node in nodes), [shape.domain.length]])
-    frames = bishop_frames(shape, places, tolerance)
-    tip = frames[-1]
+    rotation, position = bishop_frames(shape.pieces(tolerance), places)
     turn, push = np.zeros((3, 2 * tubes)), np.zeros((3, 2 * tubes))
     start = 1
     for node in nodes:
-        here = frames[start : start + len(node.s)]
+        here = slice(start, start + len(node.s))
         start += len(node.s)
         bend, stretch = _strain_rates(node, shape, rates)
-        turning = here[:, :3, :3] @ bend  # (g, 3, 2N)
-        arm = tip[:3, 3] - here[:, :3, 3]
+        turning = rotation[here] @ bend  # (g, 3, 2N)
+        arm = position[-1] - position[here]
         turn += turning.sum(axis=0)
         push += np.cross(turning, arm[:, :, None], axis=1).sum(axis=0)
-        push += np.einsum("g,gi,p->ip", node.rule.weights, here[:, :3, 0], stretch)
-    return np.vstack([push, turn + tip[:3, :1] * _leader_turn(shape, rates)])
+        push += np.einsum("g,gi,p->ip", node.rule.weights, rotation[here, :, 0], stretch)
+    return np.vstack([push, turn + rotation[-1, :, :1] * _leader_turn(shape, rates)])
 
 
 def _strain_rates(node: SectionNodes, shape: TorsionShape, rates: Sensitivity) -> tuple[Array, Array]:

@@ -20,6 +20,7 @@ from ctr_pvs.full import FullEnergy
 from ctr_pvs.full_solution import FullShape
 from ctr_pvs.se3 import adjoint
 from ctr_pvs.se3 import hat
+from ctr_pvs.se3 import homogeneous
 from ctr_pvs.se3 import inverse
 from ctr_pvs.se3 import roll
 from ctr_pvs.sections import SAME_PLACE
@@ -132,7 +133,7 @@ class Motion:
         places = [self.sections[m].start + self.sections[m].length * part * rule.x for m, part in pieces]
         section = self.sections[number]
         stops = np.concatenate([np.zeros(1), *places, [section.start + x * section.length]])
-        frames = bishop_frames(self.shape, stops, INTEGRATION)
+        frames = homogeneous(*bishop_frames(self.shape.pieces(INTEGRATION), stops))
         spatial = np.zeros((6, self.alpha_rate.shape[1]))
         start = 1
         for m, part in pieces:

@@ -20,6 +20,9 @@ from ctr_pvs.sections import Domain
 
 Array = NDArray[np.float64]
 
+#: Places in a section where the strength of its coupling is sampled.
+FIVE_PLACES = np.linspace(0.0, 1.0, 5)
+
 
 @dataclass(frozen=True, eq=False)
 class Materials:
@@ -51,12 +54,26 @@ class Materials:
         """(M,) true for sections where two or more curved tubes overlap: only there do tubes twist one another."""
         return self.curved.sum(axis=1) >= 2
 
+    @cached_property
+    def curved_tubes(self) -> list[list[int]]:
+        """The pre-curved tubes of each section."""
+        return [np.flatnonzero(row).tolist() for row in self.curved]
+
     def coupling(self, m: int) -> float:
         """Strength of the coupling in section m: the most that twist can be pulled, relative to torsion (two tubes of
         constant pre-curvature: lambda of the stability literature)."""
+        if m not in self._couplings:
+            self._couplings[m] = self._coupling(m)
+        return self._couplings[m]
+
+    @cached_property
+    def _couplings(self) -> dict[int, float]:
+        return {}
+
+    def _coupling(self, m: int) -> float:
         start, length = self.domain.boundaries[m], self.domain.lengths[m]
         tubes = self.curved[m]
-        kappa = np.abs(self.pre_curvature(m, start + length * np.linspace(0.0, 1.0, 5))).max(axis=0)[tubes]
+        kappa = np.abs(self.pre_curvature(m, start + length * FIVE_PLACES)).max(axis=0)[tubes]
         moment = self.bending[m, tubes] * kappa
         pull = np.outer(moment, moment) / self.bending[m].sum()
         soft = 1.0 / np.sqrt(self.torsional[m, tubes])
@@ -82,10 +99,10 @@ class Materials:
         self, m: int, s: Array, value: Callable[[Segment, Array], NDArray[np.complex128]]
     ) -> NDArray[np.complex128]:
         out = np.zeros((*s.shape, self.robot.n_tubes), dtype=complex)
-        for tube in np.flatnonzero(self.curved[m]):
+        for tube in self.curved_tubes[m]:
             index = int(self.domain.segment[m, tube])
             start = self.robot.tubes[tube].breaks[index]
-            out[..., tube] = value(self.segment(int(tube), index), s + self.domain.D[tube] - start)
+            out[..., tube] = value(self.segment(tube, index), s + self.domain.D[tube] - start)
         return out
 
     @cached_property

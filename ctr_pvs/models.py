@@ -13,6 +13,7 @@ from ctr_pvs.energy import TorsionEnergy
 from ctr_pvs.materials import Materials
 from ctr_pvs.robot import Robot
 from ctr_pvs.sections import piecewise_domain
+from ctr_pvs.twist import Degrees
 
 #: Rotations at one D reuse everything; a path along D needs the latest positions at a few degrees.
 KEPT = 16
@@ -23,10 +24,10 @@ class Models:
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
-        self._kept: OrderedDict[tuple[bytes, int], TorsionEnergy] = OrderedDict()
+        self._kept: OrderedDict[tuple[bytes, Degrees], TorsionEnergy] = OrderedDict()
         self._pairs: WeakKeyDictionary[TorsionEnergy, PairForm] = WeakKeyDictionary()
 
-    def energy(self, D: NDArray[np.float64], degree: int) -> TorsionEnergy:
+    def energy(self, D: NDArray[np.float64], degree: Degrees) -> TorsionEnergy:
         """The energy at ``D`` (N,) [m] with twist rates of polynomial ``degree`` in coupled sections."""
         key = (D.tobytes(), degree)
         if key in self._kept:

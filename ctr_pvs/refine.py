@@ -14,18 +14,13 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ctr_pvs.backbone import bishop_frames
-from ctr_pvs.continuation import State
+from ctr_pvs.backbone import end_position
 from ctr_pvs.full import FullEnergy
 from ctr_pvs.full_solution import FullSolution
 from ctr_pvs.full_solution import solve_full
-from ctr_pvs.models import Models
 from ctr_pvs.shape import Shape
 from ctr_pvs.solution import Solution
-from ctr_pvs.solution import TorsionlessSolution
 from ctr_pvs.solution import TorsionSolution
-from ctr_pvs.solve import NewtonEnd
-from ctr_pvs.solve import newton
 from ctr_pvs.strain_basis import PolynomialBasis
 
 Array = NDArray[np.float64]
@@ -57,31 +52,9 @@ class _Rung(Generic[S]):
     iterations: int
 
 
-def refine_torsion(
-    models: Models, state: State, degrees: tuple[int, ...], tolerance: float
-) -> Refined[TorsionSolution] | None:
-    """The `torsion` level; None if a higher degree has no stable equilibrium next to the lower one's."""
-    return _climb(_torsion_rungs(models, state, degrees), tolerance)
-
-
 def refine_full(start: TorsionSolution, tolerance: float) -> Refined[FullSolution] | None:
     """The `full` level with Legendre bases, from the `torsion` equilibrium that it converges to."""
     return _climb(_full_rungs(start), tolerance)
-
-
-def torsionless(models: Models, alpha: Array, D: Array, tolerance: float) -> Refined[TorsionSolution] | None:
-    """Eq. (28)-(31): no twist, closed form.  The estimate is the tip motion of one Newton step of the twist it
-    neglects; None where twist would not come back at all."""
-    energy = models.energy(D, DEGREES[0])
-    untwisted = np.zeros(energy.n)
-    solution = TorsionlessSolution(energy, alpha)
-    step = newton(energy, alpha, untwisted, steps=1)
-    if step.end is NewtonEnd.INDEFINITE:
-        return None
-    fine = INTEGRATION_SHARE * tolerance
-    twisted = TorsionSolution(energy, alpha, step.q).shape
-    estimate = np.linalg.norm(tip_position(twisted, fine) - tip_position(solution.shape, LOOSER * fine))
-    return Refined(solution, step.residual, float(estimate), 0)
 
 
 def _climb(rungs: Iterator[_Rung[S] | None], tolerance: float) -> Refined[S] | None:
@@ -101,19 +74,6 @@ def _climb(rungs: Iterator[_Rung[S] | None], tolerance: float) -> Refined[S] | N
     return refined
 
 
-def _torsion_rungs(models: Models, state: State, degrees: tuple[int, ...]) -> Iterator[_Rung[TorsionSolution] | None]:
-    torques = state.torques
-    for degree in degrees:
-        energy = models.energy(state.D, degree)
-        result = newton(energy, state.alpha, energy.space.coordinates(torques))
-        if not result.converged:
-            yield None
-            return
-        solution = TorsionSolution(energy, state.alpha, result.q)
-        torques = solution.shape.torques
-        yield _Rung(solution, result.residual, result.iterations)
-
-
 def _full_rungs(start: TorsionSolution) -> Iterator[_Rung[FullSolution] | None]:
     shape: Shape = start.shape
     for degree in FULL_DEGREES:
@@ -126,7 +86,5 @@ def _full_rungs(start: TorsionSolution) -> Iterator[_Rung[FullSolution] | None]:
 
 
 def tip_position(shape: Shape, tolerance: float) -> Array:
-    """Tip (3,) [m], integrated with steps for ``tolerance`` [m]."""
-    frames = bishop_frames(shape, np.array([0.0, shape.domain.length]), tolerance)
-    tip: Array = frames[-1][:3, 3]
-    return tip
+    """Tip (3,) [m], integrated for an error of ``tolerance`` [m]."""
+    return end_position(shape.pieces(tolerance))

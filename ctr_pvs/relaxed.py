@@ -16,6 +16,7 @@ from scipy.optimize import minimize
 
 from ctr_pvs.energy import TorsionEnergy
 from ctr_pvs.solve import newton
+from ctr_pvs.twist import TorqueField
 
 Array = NDArray[np.float64]
 
@@ -28,18 +29,19 @@ SAME_ANGLE = 1e-5
 @dataclass(frozen=True, eq=False)
 class Relaxed:
     """alpha (N,) [rad] with alpha_1 = 0, the unknowns q (n,) there, and whether other relaxed states are as near to
-    zero."""
+    zero; the torque field there."""
 
     alpha: Array
     q: Array
     several: bool
+    torques: TorqueField
 
 
 def relaxed_state(energy: TorsionEnergy) -> Relaxed | None:
     """The relaxed state of ``energy`` nearest to zero base angles; None if the search finds no minimum."""
     tubes = energy.materials.robot.n_tubes
     if energy.n == 0:
-        return Relaxed(np.zeros(tubes), np.zeros(0), False)
+        return Relaxed(np.zeros(tubes), np.zeros(0), False, energy.space.field(np.zeros(0)))
     minima = [found for start in _starts(energy) if (found := _minimum(energy, start)) is not None]
     if not minima:
         return None
@@ -50,7 +52,7 @@ def relaxed_state(energy: TorsionEnergy) -> Relaxed | None:
         a for a, _ in minima[1:] if np.abs(a).max() < distance + SAME_ANGLE and np.abs(a - alpha).max() > SAME_ANGLE
     ]
     half_turn = bool(np.any(np.abs(np.abs(alpha) - np.pi) < SAME_ANGLE))  # +pi and -pi: one shape, two histories
-    return Relaxed(alpha, q, bool(twins) or half_turn)
+    return Relaxed(alpha, q, bool(twins) or half_turn, energy.space.field(q))
 
 
 def _starts(energy: TorsionEnergy) -> list[Array]:

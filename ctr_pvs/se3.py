@@ -63,6 +63,13 @@ def roll(angle: Array) -> Array:
     return out
 
 
+def homogeneous(rotation: Array, position: Array) -> Array:
+    """(..., 4, 4) of a rotation (..., 3, 3) and a position (..., 3)."""
+    out = np.zeros((*position.shape[:-1], 4, 4))
+    out[..., :3, :3], out[..., :3, 3], out[..., 3, 3] = rotation, position, 1.0
+    return out
+
+
 def inverse(g: Array) -> Array:
     """g^-1 (..., 4, 4)."""
     out = np.zeros_like(g)

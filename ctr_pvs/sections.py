@@ -65,6 +65,13 @@ class Domain:
         return float(self.boundaries[-1])
 
     @cached_property
+    def leader(self) -> int:
+        """The tube that reaches farthest, the innermost of equals: poses carry its material frame."""
+        # With nothing out, what lies in the guide just behind the orifice.
+        reach = self.segment[-1] if self.n_sections else self.guide_segment
+        return int(np.flatnonzero(reach != ABSENT)[-1])
+
+    @cached_property
     def topology(self) -> tuple[object, ...]:
         """Equal for two domains whose sections hold the same segments in the same order."""
         return (self.segment.shape, self.segment.tobytes(), self.guide_segment.tobytes())

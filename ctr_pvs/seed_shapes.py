@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ctr_pvs.backbone import bishop_frames
+from ctr_pvs.backbone import poses
 from ctr_pvs.equilibrium import Equilibrium
 from ctr_pvs.full import FullEnergy
 from ctr_pvs.full_solution import FullSolution
@@ -240,5 +240,4 @@ def _places(shape: Shape) -> Array:
 
 def _points(shape: Shape) -> Array:
     """(DRAWN, 3) positions [m] of the backbone, the tip last."""
-    points: Array = bishop_frames(shape, _places(shape), TOLERANCE)[:, :3, 3]
-    return points
+    return poses(shape.pieces(TOLERANCE), _places(shape)).position

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from abc import ABC
 from abc import abstractmethod
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ctr_pvs.actuation import Loads
 from ctr_pvs.actuation import virtual_work_loads
+from ctr_pvs.backbone_plan import backbone_plan
 from ctr_pvs.energy import TorsionEnergy
 from ctr_pvs.jacobian import tip_jacobian
+from ctr_pvs.pieces import Piece
+from ctr_pvs.serving import Served
 from ctr_pvs.shape import Shape
 from ctr_pvs.shape import TorsionlessShape
 from ctr_pvs.shape import TorsionShape
@@ -32,6 +36,11 @@ class Solution(ABC):
     @property
     @abstractmethod
     def degrees_of_freedom(self) -> int: ...
+
+    def pieces(self, tolerance: float, tube: int | None = None) -> list[Piece]:
+        """The backbone for an integration error of ``tolerance`` [m]; rolls are those of ``tube``, the leader if
+        None."""
+        return self.shape.pieces(tolerance, tube)
 
     @abstractmethod
     def loads(self) -> Loads:
@@ -81,12 +90,39 @@ class TorsionSolution(Solution):
         return tip_jacobian(self.energy, self.shape, tolerance)
 
 
-class TorsionlessSolution(TorsionSolution):
+class ServedSolution(TorsionSolution):
+    """What a prepared model has solved.  Outputs read all its unknowns, those that only check being zero."""
+
+    def __init__(self, served: Served) -> None:
+        self.served = served
+        self.energy, self.alpha = served.model.energy, served.alpha
+
+    @cached_property
+    def q(self) -> Array:  # type: ignore[override]
+        return self.served.q
+
+    @cached_property
+    def shape(self) -> TorsionShape:  # type: ignore[override]
+        return TorsionShape(self.energy.space, self.alpha, self.q)
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        return self.served.model.n
+
+    def pieces(self, tolerance: float, tube: int | None = None) -> list[Piece]:
+        return backbone_plan(self.served.model, tolerance, tube).pieces(self.served.z)
+
+    def stability_margin(self) -> float:
+        """Of the finer model that checks: a basis is optimistic."""
+        return self.served.model.margin(self.served)
+
+
+class TorsionlessSolution(ServedSolution):
     """No twist anywhere: eq. (28)-(31).  The margin is that of the twist it neglects."""
 
-    def __init__(self, energy: TorsionEnergy, alpha: Array) -> None:
-        super().__init__(energy, alpha, np.zeros(energy.n))
-        self.shape = TorsionlessShape(energy.space, alpha, self.q)
+    @cached_property
+    def shape(self) -> TorsionlessShape:  # type: ignore[override]
+        return TorsionlessShape(self.energy.space, self.alpha, self.q)
 
     @property
     def degrees_of_freedom(self) -> int:

@@ -17,13 +17,12 @@ from ctr_pvs.models import Models
 from ctr_pvs.refine import DEGREES
 from ctr_pvs.refine import Refined
 from ctr_pvs.refine import refine_full
-from ctr_pvs.refine import refine_torsion
-from ctr_pvs.refine import torsionless
-from ctr_pvs.relaxed import relaxed_state
 from ctr_pvs.renda2021 import check_renda2021
 from ctr_pvs.robot import Robot
+from ctr_pvs.serve import Position
+from ctr_pvs.serve import Server
+from ctr_pvs.serving import Served
 from ctr_pvs.snap import Snap
-from ctr_pvs.solution import TorsionSolution
 from ctr_pvs.status import NoEquilibriumError
 from ctr_pvs.status import Status
 from ctr_pvs.travel import TravelEnd
@@ -47,7 +46,8 @@ class EquilibriumSolver:
 
     tolerance : tip error [m] that an answer may have.
     fidelity : "torsionless" (eq. (28)-(31), closed form), "torsion", "full" (the seed's PVS, all strains free), or
-        "auto": torsion, which without external loads is the limit of "full".
+        "auto": the first of "torsionless" and "torsion" that meets the tolerance.  "full" is never needed: without
+        external loads "torsion" is its limit.  Degrees of the bases follow from the tolerance at every level.
     force_model : "virtual_work" (dE/dD), or "renda2021": eq. (41) on the +D axis, for two tubes.
     """
 
@@ -63,9 +63,10 @@ class EquilibriumSolver:
         self.robot = robot
         self.tolerance = float(tolerance)
         self.force_model = force_model
-        self._level = "torsion" if fidelity == "auto" else fidelity
+        self._level = fidelity
         self._models = Models(robot)
-        self._last: State | None = None
+        self._server = Server(robot, self.tolerance, untwisted=fidelity == "auto")
+        self._last: Position | None = None
 
     def follow(self, alpha: ArrayLike, D: ArrayLike, budget: float | None = None) -> Equilibrium:
         """Go from the last good answer to (alpha, D) along the straight path, through folds: ``solve`` with a warm
@@ -88,11 +89,12 @@ class EquilibriumSolver:
         """
         if self._last is None:
             raise NoEquilibriumError("no coupled equilibrium to start from: solve a command first")
-        alpha, D = self._last.alpha, self._last.D
+        state = self._last.state
+        alpha, D = state.alpha, state.D
         lengths = np.array([tube.length for tube in self.robot.tubes])
         lowest, highest = np.append(0.0, D[:-1]), np.minimum(np.append(D[1:], np.inf), lengths)
         bounds = np.concatenate([alpha - turn, lowest]), np.concatenate([alpha + turn, highest])
-        return distance_to_snap(self._models, self._last, bounds, DEGREES[1], _deadline(budget))
+        return distance_to_snap(self._models, state, bounds, DEGREES[1], _deadline(budget))
 
     def reset(self) -> None:
         """Forget the warm start: the next solve is cold."""
@@ -104,7 +106,8 @@ class EquilibriumSolver:
         start : "warm" follows the straight path from the last good answer; "cold", and the first solve, the path from
             the relaxed robot at this D.  Angles are not wrapped: 280 deg and -80 deg are different histories.
             "lowest-energy" has no history: of all stable equilibria that ``equilibria`` finds, the one of least energy.
-        budget : seconds that the solve may take; past it the status is TIMEOUT.
+        budget : seconds that following the path may take; past it the status is TIMEOUT.  A command near enough for
+            one proven step is answered at once.
 
         The warm start stays the last good one when a solve fails.
 
@@ -118,26 +121,27 @@ class EquilibriumSolver:
             return self._torsionless(alpha, D)
         if start == "lowest-energy":
             return self._lowest(alpha, D)
-        origin, note = self._origin(alpha, D, start)
-        if origin is None:
-            return self._failure(alpha, D, Status.NOT_CONVERGED, note)
-        return self._answer(origin, alpha, D, deadline, note)
+        if start == "cold" or self._last is None:
+            return self._cold(alpha, D, deadline)
+        position = self._server.advance(self._last, alpha, D)
+        if position is not None:
+            return self._keep(position, (), position.iterations, "")
+        return self._travelled(self._last.state, alpha, D, deadline, "")
 
-    def _origin(self, alpha: Array, D: Array, start: str) -> tuple[State | None, str]:
-        """The state to set out from, and what the user should know about it."""
-        if start == "warm" and self._last is not None:
-            return self._last, ""
-        energy = self._models.energy(D, DEGREES[0])
-        relaxed = relaxed_state(energy)
+    def _cold(self, alpha: Array, D: Array, deadline: float) -> Equilibrium:
+        """The path from the relaxed robot at this D."""
+        relaxed = self._server.rungs(D).relaxed
         if relaxed is None:
-            return None, "the search for the relaxed robot, where a cold start sets out, found no energy minimum"
+            message = "the search for the relaxed robot, where a cold start sets out, found no energy minimum"
+            return self._failure(alpha, D, Status.NOT_CONVERGED, message)
         # A common rotation of all tubes changes nothing: begin with tube 1 where the command wants it.
-        begin = relaxed.alpha + (alpha[0] - relaxed.alpha[0])
+        state = State(relaxed.alpha + (alpha[0] - relaxed.alpha[0]), D, relaxed.torques)
         note = "; several relaxed states are equally near, the path set out from one of them" if relaxed.several else ""
-        return State(begin, D, energy.space.field(relaxed.q)), note
+        return self._travelled(state, alpha, D, deadline, note)
 
-    def _answer(self, origin: State, alpha: Array, D: Array, deadline: float, note: str) -> Equilibrium:
-        """Travel at the lowest degree that keeps the branch up to the converged model, then refine.
+    def _travelled(self, origin: State, alpha: Array, D: Array, deadline: float, note: str) -> Equilibrium:
+        """Travel at the lowest degree that keeps the branch up to the converged model, then settle on the degrees that
+        the tolerance asks for.
 
         Folds lie a little elsewhere at a low degree.  A journey through one, or to the edge of one, is therefore made
         again at the next degree, until two agree.
@@ -150,83 +154,82 @@ class EquilibriumSolver:
                 continue  # a state at the edge of a fold may lie beyond the fold of a lower degree
             if journey.end is not TravelEnd.REACHED:
                 return self._failure(alpha, D, _STATUS[journey.end], _stopped(journey), iterations)
-            refined = refine_torsion(self._models, journey.state, DEGREES[index:], self.tolerance)
-            if refined is None:
+            position = self._server.settle(journey.state)
+            if position is None:
                 continue
-            iterations += refined.iterations
-            delicate = bool(journey.snaps) or refined.solution.stability_margin() < DELICATE
+            iterations += position.iterations
+            delicate = bool(journey.snaps) or position.margin < DELICATE
             if not delicate or index == MOST_REPEATS or (before is not None and journey.agrees_with(before)):
-                return self._keep(refined, journey.snaps, iterations, note)
+                return self._keep(position, journey.snaps, iterations, note)
             before = journey
         message = "the refined model lost the branch that the coarse one followed: a fold is very near this command"
         return self._failure(alpha, D, Status.NOT_CONVERGED, message, iterations)
 
-    def _keep(
-        self, torsion: Refined[TorsionSolution], snaps: tuple[Snap, ...], iterations: int, note: str
-    ) -> Equilibrium:
-        """The answer of the level that was asked for; a good one is kept as the next warm start."""
-        refined: Refined[TorsionSolution] | Refined[FullSolution] = torsion
-        alpha, D = torsion.solution.alpha, torsion.solution.energy.materials.domain.D
-        if self._level == "full":
-            full = refine_full(torsion.solution, self.tolerance)
-            if full is None:
-                message = "Newton at the full level does not converge from the torsion equilibrium"
-                return self._failure(alpha, D, Status.NOT_CONVERGED, message, iterations)
-            refined, iterations = full, iterations + full.iterations
-        answer = self._success(alpha, D, refined, iterations, note, snaps)
-        if answer.success:
-            # Tubes that are not coupled remember nothing: what follows sets out from the relaxed robot.
-            coupled = torsion.solution.degrees_of_freedom > 0
-            self._last = State(alpha, D, torsion.solution.shape.torques) if coupled else None
-        return answer
-
     def _lowest(self, alpha: Array, D: Array) -> Equilibrium:
         """The stable equilibrium of least energy, whatever path may lead there."""
         every = equilibria(self.robot, alpha, D, self.tolerance)
-        if not every.stable:
+        position = self._server.settle(every.stable[0].state) if every.stable else None
+        if position is None:
             return self._failure(alpha, D, Status.NO_STABLE_EQUILIBRIUM, f"none found: {every.method}")
-        best = every.stable[0]
-        assert isinstance(best.solution, TorsionSolution)
-        refined = Refined(best.solution, best.residual, best.error_estimate, best.iterations)
         note = f", of least energy among {len(every.stable)}; {every.method}"
-        return self._keep(refined, (), best.iterations, note)
+        return self._keep(position, (), position.iterations, note)
 
     def _torsionless(self, alpha: Array, D: Array) -> Equilibrium:
         """The closed form, with what it neglects told by its error estimate."""
-        refined = torsionless(self._models, alpha, D, self.tolerance)
-        if refined is None:
+        position = self._server.untwisted_at(alpha, D)
+        if position is None:
             message = "the untwisted state is unstable: twist cannot be neglected here"
             return self._failure(alpha, D, Status.NO_STABLE_EQUILIBRIUM, message)
-        return self._success(alpha, D, refined, 0, "; twist is neglected")
+        return self._told(position, (), 0, "; twist is neglected")
 
-    def _success(
+    def _keep(self, position: Position, snaps: tuple[Snap, ...], iterations: int, note: str) -> Equilibrium:
+        """The answer of the level that was asked for; a good one is kept as the next warm start."""
+        if self._level == "full":
+            answer = self._full(position, snaps, iterations, note)
+        else:
+            answer = self._told(position, snaps, iterations, note)
+        if answer.success:
+            # Tubes that are not coupled remember nothing: what follows sets out from the relaxed robot.
+            self._last = position if position.coupled else None
+        return answer
+
+    def _full(self, position: Position, snaps: tuple[Snap, ...], iterations: int, note: str) -> Equilibrium:
+        full = refine_full(position.solution, self.tolerance)
+        if full is None:
+            message = "Newton at the full level does not converge from the torsion equilibrium"
+            return self._failure(position.alpha, position.D, Status.NOT_CONVERGED, message, iterations)
+        return self._told(position, snaps, iterations + full.iterations, note, full)
+
+    def _told(
         self,
-        alpha: Array,
-        D: Array,
-        refined: Refined[TorsionSolution] | Refined[FullSolution],
+        position: Position,
+        snaps: tuple[Snap, ...],
         iterations: int,
         note: str,
-        snaps: tuple[Snap, ...] = (),
+        full: Refined[FullSolution] | None = None,
     ) -> Equilibrium:
+        """The answer, with its status and message."""
+        told: Served | Refined[FullSolution] = position.served if full is None else full
+        level = position.level if full is None else "full"
         status, message = Status.OK, "stable equilibrium" + note
         if snaps:
             status, message = Status.SNAP, _snapped(snaps) + note
-        if refined.estimate > self.tolerance:
+        if told.estimate > self.tolerance:
             status = Status.TOLERANCE_MISSED
             needed = f"{self.tolerance:.1e} m were asked for"
-            message = f"tip error about {refined.estimate:.1e} m at the {self._level} level, {needed}"
+            message = f"tip error about {told.estimate:.1e} m at the {level} level, {needed}"
         return Equilibrium(
-            alpha,
-            D,
+            position.alpha,
+            position.D,
             status,
             message,
             self.tolerance,
-            self._level,
+            level,
             self.force_model,
-            refined.estimate,
-            refined.residual,
+            told.estimate,
+            told.residual,
             iterations,
-            refined.solution,
+            position if full is None else full.solution,
             snaps,
         )
 

@@ -10,11 +10,9 @@ from ctr_pvs.energy import TorsionEnergy
 from ctr_pvs.relaxed import relaxed_state
 from ctr_pvs.sections import ABSENT
 from ctr_pvs.sensitivity import Sensitivity
+from ctr_pvs.serving import raised
 
 Array = NDArray[np.float64]
-
-#: The margin is checked again with polynomials of this much higher degree: a Ritz value of low degree is optimistic.
-RECHECK = 2
 
 
 def stability_margin(energy: TorsionEnergy, q: Array, alpha: Array) -> float:
@@ -30,11 +28,12 @@ def stability_margin(energy: TorsionEnergy, q: Array, alpha: Array) -> float:
 
 
 def rechecked_margin(energy: TorsionEnergy, q: Array, alpha: Array) -> float:
-    """The smaller of the margins at this degree and at a higher one, wherever the first is below 1."""
+    """The smaller of the margins at this degree and at a higher one, wherever the first is below 1: a Ritz value of low
+    degree is optimistic."""
     margin = stability_margin(energy, q, alpha)
     if margin == 1.0:
         return margin
-    finer = TorsionEnergy(energy.materials, energy.space.degree + RECHECK)
+    finer = TorsionEnergy(energy.materials, raised(energy.space.degree))
     return min(margin, stability_margin(finer, finer.space.coordinates(energy.space.field(q)), alpha))
 
 

@@ -15,7 +15,9 @@ relative to the torsional stiffness, and the zero-torque condition is a projecti
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,9 +28,15 @@ from ctr_pvs.materials import Materials
 Array = NDArray[np.float64]
 
 CONSTANT = TwistBasis(0)
+END = np.ones(1)
 #: Square root of a section's coupling that one panel of polynomials takes on.  Beyond, a twist kink is short against
 #: the section, and polynomials over all of it would pin the kink where nothing holds it.
 BENDS_A_PANEL = 3.5
+
+
+def panels_needed(coupling: float) -> int:
+    """Number of equal panels for a section of this ``Materials.coupling``."""
+    return max(1, math.ceil(math.sqrt(coupling) / BENDS_A_PANEL))
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,17 +96,22 @@ class Block:
         return inverse[:, None] * self.frame
 
 
+#: Polynomial degree of the torques in every coupled section, or section by section (others are not read).
+Degrees: TypeAlias = int | tuple[int, ...]
+
+
 class TwistSpace:
-    """The unknown twist fields of one domain at one polynomial degree.
+    """The unknown twist fields of one domain with polynomials of one degree, or of one for each section.
 
     n : number of unknowns.  Psi is affine in them: psi(s) = alpha + A(s) q.
     """
 
-    def __init__(self, materials: Materials, degree: int) -> None:
+    def __init__(self, materials: Materials, degree: Degrees) -> None:
         self.materials = materials
         self.degree = degree
         coupled = np.flatnonzero(materials.coupled)
         self.first, self.last = (int(coupled[0]), int(coupled[-1])) if len(coupled) else (0, -1)
+        self._lead_compliances: dict[int, Array] = {}
         self.blocks = self._blocks()
         self.n = self.blocks[-1].columns.stop if self.blocks else 0
 
@@ -112,8 +125,8 @@ class TwistSpace:
         is."""
         if not self.materials.coupled[m]:
             return CONSTANT
-        panels = int(np.ceil(np.sqrt(self.materials.coupling(m)) / BENDS_A_PANEL))
-        return TwistBasis(self.degree, max(1, panels))
+        degree = self.degree if isinstance(self.degree, int) else self.degree[m]
+        return TwistBasis(degree, panels_needed(self.materials.coupling(m)))
 
     def _twisting(self) -> NDArray[np.bool_]:
         """(last + 1, N) tubes that carry torque in each section: curved in a coupled section from there on."""
@@ -144,10 +157,12 @@ class TwistSpace:
 
     def _lead_compliance(self, m: int) -> Array:
         """(N,) twist per torque from the tubes' bases to the start of section m [rad/(N m)]."""
-        stiffness = self.materials.torsional[:m]
-        lengths = self.materials.domain.lengths[:m, None]
-        shares = np.divide(lengths, stiffness, out=np.zeros_like(stiffness), where=stiffness > 0.0)
-        return self.materials.guide_compliance + shares.sum(axis=0)
+        if m not in self._lead_compliances:
+            stiffness = self.materials.torsional[:m]
+            lengths = self.materials.domain.lengths[:m, None]
+            shares = np.divide(lengths, stiffness, out=np.zeros_like(stiffness), where=stiffness > 0.0)
+            self._lead_compliances[m] = self.materials.guide_compliance + shares.sum(axis=0)
+        return self._lead_compliances[m]
 
     def angle_map(self, m: int, x: Array) -> Array:
         """A (g, N, n) [rad/sqrt(J)] at the places ``x`` (g,) in [0, 1] of section m."""
@@ -161,15 +176,18 @@ class TwistSpace:
     def _block_map(self, block: Block, m: int, x: Array) -> Array:
         modes = block.scale[:, None] * block.frame
         if block.section < 0:
+            if m >= self.first:
+                return np.broadcast_to(modes, (len(x), *modes.shape))
             return self._lead_share(m, x)[:, :, None] * modes
         # Past its own section a block's twist is complete: the integrals at x = 1.
-        integrals = block.basis.tabulate(x if block.section == m else np.ones_like(x))[1]
+        if block.section < m:
+            whole = (modes[:, :, None] * block.basis.tabulate(END)[1]).reshape(1, len(modes), -1)
+            return np.broadcast_to(whole, (len(x), *whole.shape[1:]))
+        integrals = block.basis.tabulate(x)[1]
         return (modes[None, :, :, None] * integrals[:, None, None, :]).reshape(len(x), len(modes), -1)
 
     def _lead_share(self, m: int, x: Array) -> Array:
-        """(g, N) share of the lead's compliance that lies before the places ``x`` of section m: all, past the lead."""
-        if m >= self.first:
-            return np.ones((len(x), self.materials.robot.n_tubes))
+        """(g, N) share of the lead's compliance that lies before the places ``x`` of a section m of the lead."""
         before, after, whole = (self._lead_compliance(index) for index in (m, m + 1, self.first))
         reached = before + x[:, None] * (after - before)
         return np.divide(reached, whole, out=np.zeros_like(reached), where=whole > 0.0)

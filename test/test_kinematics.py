@@ -19,6 +19,7 @@ from ctr_pvs.materials import Materials
 from ctr_pvs.se3 import adjoint
 from ctr_pvs.se3 import coadjoint
 from ctr_pvs.se3 import hat
+from ctr_pvs.se3 import homogeneous
 from ctr_pvs.se3 import inverse
 from ctr_pvs.se3 import roll
 from ctr_pvs.se3 import small_adjoint
@@ -52,8 +53,8 @@ def material_pose(robot, alpha, D, q, tube, X):
                 psi = alpha[tube] + shape.energy.space.maps(number, np.array([x])).angle[0, tube] @ q
                 return frame @ roll(psi)
         raise AssertionError("the place is on no guided section")
-    frame = bishop_frames(shape, np.array([0.0, s]), 1e-13)[-1]
-    return frame @ roll(shape.angles_at(np.array([s]))[0, tube])
+    rotations, positions = bishop_frames(shape.pieces(1e-13), np.array([0.0, s]))
+    return homogeneous(rotations[-1], positions[-1]) @ roll(shape.angles_at(np.array([s]))[0, tube])
 
 
 @pytest.mark.parametrize("seed", range(10))

@@ -1,0 +1,178 @@
+"""The backbone of one D, prepared: from the unknowns of a solve to the pieces of the rod in a few array operations.
+
+Angles are linear in z = (q, alpha, 1), and the curvature of a section is a sum of the turned pre-curvatures of its
+tubes, so both come from tables.  Where one tube is curved the piece is a closed arc, elsewhere a bend sampled at Gauss
+points, as many as the largest torques that the tubes can exert may ask for: a choice of D and tolerance alone.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ctr_pvs.basis import gauss_legendre
+from ctr_pvs.collocation import nodes_needed
+from ctr_pvs.pieces import Arc
+from ctr_pvs.pieces import Bend
+from ctr_pvs.pieces import Piece
+from ctr_pvs.sections import ABSENT
+from ctr_pvs.serving import ServingModel
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+
+def backbone_plan(model: ServingModel, tolerance: float, tube: int | None) -> BackbonePlan:
+    """The plan of ``model`` for ``tolerance`` [m] and ``tube`` (the leader if None), made when first asked for."""
+    key = (tolerance, tube)
+    plan: BackbonePlan | None = model.prepared.get(key)
+    if plan is None:
+        leader = model.energy.materials.domain.leader
+        plan = model.prepared[key] = BackbonePlan(model, tolerance, leader if tube is None else tube)
+    return plan
+
+
+class BackbonePlan:
+    """Tables for ``model`` and an integration error of ``tolerance`` [m]; rolls are those of ``tube``.
+
+    waves (2 W, n + N + 1) : from z to the angles whose sines are cos and sin of psi, tube by tube and place by place.
+    curvature (2 P, 2 W) : from these sines to the curvatures [1/m], real and imaginary parts by turns, of P places: the
+    starts of all arcs, then the Gauss points of all bends.
+    rolls (3 arcs + Gauss points, n + N + 1) : from z to start, rate and turn of each arc, then rolls at Gauss points.
+    bends : length and number of Gauss points of each; arcs : length and turn of the pre-curvature of each.
+    order : kinds of the pieces along the rod, true for an arc.
+    """
+
+    def __init__(self, model: ServingModel, tolerance: float, tube: int) -> None:
+        self._model, self._tube = model, tube
+        self._materials = model.energy.materials
+        self._relative = tolerance / max(self._materials.domain.length, tolerance)
+        self._strongest = self._largest_torques()
+        self.arcs: list[tuple[float, float]] = []
+        self.bends: list[tuple[float, int]] = []
+        self.order: list[bool] = []
+        places, rolls = self._lay_out()
+        self._tabulate(places)
+        self.rolls = np.array(rolls).reshape(-1, model.waves.shape[1])
+
+    def pieces(self, z: Array) -> list[Piece]:
+        """The pieces for unknowns and base angles ``z`` of the model."""
+        k = self.curvature.dot(np.sin(self.waves.dot(z))).view(complex)
+        rolls = self.rolls.dot(z)
+        count = len(self.arcs)
+        starts, turns = k[:count].tolist(), rolls[: 3 * count].tolist()
+        arc, bend, place, angle = 0, 0, count, 3 * count
+        pieces: list[Piece] = []
+        for is_arc in self.order:
+            if is_arc:
+                length, turn = self.arcs[arc]
+                roll, rate, turning = turns[3 * arc : 3 * arc + 3]
+                pieces.append(Arc(length, starts[arc], turn + turning, roll, rate))
+                arc += 1
+            else:
+                length, nodes = self.bends[bend]
+                pieces.append(Bend(length, k[place : place + nodes], rolls[angle : angle + nodes]))
+                place, angle, bend = place + nodes, angle + nodes, bend + 1
+        return pieces
+
+    def _lay_out(self) -> tuple[list[tuple[int, Array]], list[Array]]:
+        """Fills ``arcs``, ``bends`` and ``order``; the places (section, x) of the curvatures, the rows of the rolls."""
+        starts: list[tuple[int, Array]] = []
+        inside: list[tuple[int, Array]] = []
+        arc_rolls: list[Array] = []
+        bend_rolls: list[Array] = []
+        for m in range(self._materials.domain.n_sections):
+            if self._is_arc(m):
+                self._add_arc(m, starts, arc_rolls)
+            else:
+                self._add_bends(m, inside, bend_rolls)
+        if not self.order:  # nothing is out: a piece of no length carries the roll
+            self.arcs, self.order = [(0.0, 0.0)], [True]
+            at_orifice = self._angle_rows(0, np.zeros(1))[0, self._tube]
+            arc_rolls = [at_orifice, 0.0 * at_orifice, 0.0 * at_orifice]
+        return starts + inside, arc_rolls + bend_rolls
+
+    def _is_arc(self, m: int) -> bool:
+        """True where the strain is constant in a frame that turns at a constant rate."""
+        if self._materials.coupled[m]:
+            return False
+        segments = self._materials.domain.segment[m]
+        curved = self._materials.curved_tubes[m]
+        return all(len(self._materials.segment(j, int(segments[j])).curvature) == 1 for j in curved)
+
+    def _add_arc(self, m: int, starts: list[tuple[int, Array]], rolls: list[Array]) -> None:
+        length = float(self._materials.domain.lengths[m])
+        start, end = self._angle_rows(m, np.array([0.0, 1.0]))
+        rates = (end - start) / length
+        curved = self._materials.curved_tubes[m]
+        turn, turning = 0.0, np.zeros(rates.shape[1])
+        if curved:
+            segment = self._materials.segment(curved[0], int(self._materials.domain.segment[m, curved[0]]))
+            turn, turning = segment.turn, rates[curved[0]]
+        self.arcs.append((length, turn))
+        self.order.append(True)
+        starts.append((m, np.zeros(1)))
+        rolls += [start[self._tube], rates[self._tube], turning]
+
+    def _add_bends(self, m: int, inside: list[tuple[int, Array]], rolls: list[Array]) -> None:
+        panels = self._model.energy.space.basis(m).panels
+        length = float(self._materials.domain.lengths[m]) / panels
+        parts, nodes = self._division(m, length)
+        x = gauss_legendre(nodes, panels * parts).x
+        inside.append((m, x))
+        rolls.extend(self._angle_rows(m, x)[:, self._tube])
+        self.bends += [(length / parts, nodes)] * (panels * parts)
+        self.order += [False] * (panels * parts)
+
+    def _division(self, m: int, length: float) -> tuple[int, int]:
+        """Parts and Gauss points for panels of ``length`` [m], whatever the base angles."""
+        materials = self._materials
+        places = np.linspace(0.0, 1.0, 9)
+        s = materials.domain.boundaries[m] + places * materials.domain.lengths[m]
+        share = np.abs(materials.pre_curvature(m, s)) * materials.bending[m] / materials.bending[m].sum()
+        present = np.flatnonzero(materials.domain.segment[m] != ABSENT)
+        twist = max(self._strongest[j] / materials.torsional[m, j] for j in present)
+        turn = max(abs(materials.segment(int(j), int(materials.domain.segment[m, j])).turn) for j in present)
+        bend = float(share.sum(axis=1).max())
+        step = float(materials.domain.lengths[m]) / (len(places) - 1)
+        change = float(np.abs(np.diff(share, axis=0)).sum(axis=1).max()) / step
+        wave = math.sqrt(materials.coupling(m)) / (length * self._model.energy.space.basis(m).panels)
+        rate = max(twist + turn, change / bend if bend else 0.0)
+        return nodes_needed(length, bend, rate, wave if materials.coupled[m] else 0.0, self._relative)
+
+    def _largest_torques(self) -> Array:
+        """(N,) bound of the torque [N m] that the others can exert on each tube."""
+        pairs = self._model.pairs
+        bound: Array = np.abs(pairs.turns).T @ pairs.amplitude
+        return bound
+
+    def _angle_rows(self, m: int, x: Array) -> Array:
+        """(g, N, n + N + 1) from z to psi at the places ``x`` (g,) of section m."""
+        model = self._model
+        rows = np.zeros((len(x), model.tubes, model.waves.shape[1]))
+        rows[:, :, : model.n] = model.energy.space.angle_map(m, x)[:, :, model.order[: model.n]]
+        rows[:, np.arange(model.tubes), model.n + np.arange(model.tubes)] = 1.0
+        return rows
+
+    def _tabulate(self, places: list[tuple[int, Array]]) -> None:
+        """Fills ``waves`` and ``curvature``."""
+        materials = self._materials
+        angles, shares, place = [np.zeros((0, self._model.waves.shape[1]))], [np.zeros(0, complex)], [np.zeros(0, int)]
+        start = 0
+        for m, x in places:
+            s = materials.domain.boundaries[m] + x * materials.domain.lengths[m]
+            tubes = materials.curved_tubes[m]
+            share = materials.pre_curvature(m, s) * materials.bending[m] / materials.bending[m].sum()
+            angles.append(self._angle_rows(m, x)[:, tubes].reshape(-1, self._model.waves.shape[1]))
+            shares.append(share[:, tubes].ravel())
+            place.append(np.repeat(start + np.arange(len(x)), len(tubes)))
+            start += len(x)
+        psi, kappa, at = np.concatenate(angles), np.concatenate(shares), np.concatenate(place)
+        count, row = len(psi), np.arange(len(psi))
+        self.waves = np.vstack([psi, psi])
+        self.waves[:count, -1] += 0.5 * np.pi  # a cosine
+        self.curvature = np.zeros((2 * max(start, len(self.arcs)), 2 * count))
+        self.curvature[2 * at, row], self.curvature[2 * at, count + row] = kappa.real, -kappa.imag
+        self.curvature[2 * at + 1, row], self.curvature[2 * at + 1, count + row] = kappa.imag, kappa.real

@@ -1,0 +1,271 @@
+"""A model of one D and one choice of degrees, prepared so that a warm solve takes a few array operations.
+
+The unknowns are split in two: those *solved for*, and those of two polynomial degrees more, which only *check* the
+answer.  A check factorises the Hessian of all of them.  So it sees a fold that the coarser model would miss, and one
+Newton step of the finer model is the estimate of what the coarser one leaves out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg.blas import dasum
+from scipy.linalg.blas import daxpy
+from scipy.linalg.blas import dnrm2
+from scipy.linalg.blas import idamax
+from scipy.linalg.lapack import dppsv
+from scipy.linalg.lapack import dpptrf
+from scipy.linalg.lapack import dsyevd
+
+from ctr_pvs.convexity import least_cosine
+from ctr_pvs.energy import TorsionEnergy
+from ctr_pvs.pair_form import PackedForm
+from ctr_pvs.pair_form import Pairs
+from ctr_pvs.solve import CONTRACTION
+from ctr_pvs.solve import RESIDUAL_TWIST
+from ctr_pvs.twist import Degrees
+
+Array = NDArray[np.float64]
+
+#: The check adds this many polynomial degrees: a Ritz value of low degree is optimistic.
+FINER = 2
+#: A Newton step shorter than this [rad] leaves about its square: time to look at the residual.
+LAST_STEP = 2e-6
+MOST_STEPS = 8
+#: Rounding of cos and sin at large base angles.
+ROUNDING = 64.0 * float(np.finfo(float).eps)
+#: The branch between two states may leave the straight line between them by this share of the distance.
+WIDER = 1.25
+#: Largest change [rad] of the angle between two tubes in one step.
+LARGEST_TURN = 1.0
+
+
+def raised(degree: Degrees) -> Degrees:
+    """The degrees that check ``degree``."""
+    return degree + FINER if isinstance(degree, int) else tuple(d + FINER for d in degree)
+
+
+class Served:
+    """A stable equilibrium of ``model`` with all that the next step from it needs.
+
+    z : (n + N + 1,) unknowns, base angles and 1.  angles : of ``Pairs.waves``.  answers : (N, n) minus dq / d alpha.
+    residual : largest twist [rad] that the unbalanced torque would cause.  estimate : [m], see ``ServingModel``.
+    """
+
+    __slots__ = ("angles", "answers", "estimate", "iterations", "model", "residual", "z")
+
+    def __init__(
+        self,
+        model: ServingModel,
+        z: Array,
+        angles: Array,
+        answers: Array,
+        residual: float,
+        estimate: float,
+        iterations: int,
+    ) -> None:
+        self.model, self.z, self.angles, self.answers = model, z, angles, answers
+        self.residual, self.estimate, self.iterations = residual, estimate, iterations
+
+    @property
+    def alpha(self) -> Array:
+        return self.z[self.model.n : -1]
+
+    @property
+    def q(self) -> Array:
+        """The unknowns in the order of ``model.energy``, those that only check being zero."""
+        return self.model.spread(self.z[: self.model.n])
+
+
+class ServingModel:
+    """Tables of one D for unknowns of ``degree``; n : number of unknowns solved for.
+
+    energy : of two degrees more.  weights (W, n + extra) turn a change of the unknowns into motions [m] of the backbone
+    that add up to a bound of the motion of any of its points, the tip among them.
+    """
+
+    def __init__(self, energy: TorsionEnergy, degree: Degrees) -> None:
+        self.energy, self.degree = energy, degree
+        solved = _solved_for(energy)
+        self.order = np.concatenate([np.flatnonzero(solved), np.flatnonzero(~solved)])
+        self.n, self.finer = int(np.count_nonzero(solved)), energy.n
+        self.pairs = Pairs(energy, self.order)
+        self.rows = len(self.pairs.amplitude)
+        self.waves = self.pairs.waves(self.n)
+        self.form = PackedForm(self.pairs, self.n, tangents=True)
+        self.check_form = PackedForm(self.pairs, self.finer, tangents=False)
+        self.weights = _weights(energy)[:, self.order]
+        self.twist_norm = float(np.linalg.norm(energy.angle_map, axis=2).max(initial=0.0))
+        self.tubes = energy.materials.robot.n_tubes
+        #: What outputs have prepared for this model, by what they need it for.
+        self.prepared: dict[Hashable, Any] = {}
+        self._first_twist = self._twist_at_first_order()
+
+    def _twist_at_first_order(self) -> list[tuple[int, int, float, float]]:
+        """Per pair of tubes: strength [m] and phase of the sine that tells how far twist moves the tip at first order.
+
+        The twist that torsional stiffness alone would hold, as if the coupling held it as much as it can at best: so
+        that rather too many states are looked at again.
+        """
+        pull = np.abs(self.weights[:, : self.n] @ self.form.map.T).sum(axis=0) * self.pairs.amplitude
+        stiffest = 1.0 + float(self.pairs.amplitude @ np.sum(self.form.map**2, axis=1))
+        waves = pull * np.exp(1j * self.pairs.phase) / stiffest
+        out = []
+        for turn in np.unique(self.pairs.turns, axis=0):
+            total = waves[np.all(self.pairs.turns == turn, axis=1)].sum()
+            out.append((int(turn.argmin()), int(turn.argmax()), float(abs(total)), float(np.angle(total))))
+        return out
+
+    def spread(self, q: Array) -> Array:
+        out = np.zeros(self.finer)
+        out[self.order[: len(q)]] = q
+        return out
+
+    def start(self, q: Array, alpha: Array) -> Array:
+        """z for unknowns in the order of ``energy``."""
+        z = np.empty(self.n + self.tubes + 1)
+        z[: self.n] = q[self.order[: self.n]]
+        z[self.n : -1] = alpha
+        z[-1] = 1.0
+        return z
+
+    def solve(self, z: Array, before: Array | None, slack: float) -> Served | None:
+        """Newton from ``z``, changed in place, to the equilibrium of its base angles, and the check.
+
+        before : angles of the state whose branch must not be left, or None for any stable state.
+        slack : [rad] by which the finer model may differ from this one.
+
+        None if Newton leaves its basin, or if the energy is not certainly convex, at the finer degree, around both
+        states.
+        """
+        n, waves, size = self.n, self.waves, self.form.size
+        if n == 0:
+            return Served(self, z, waves.dot(z), np.zeros((self.tubes, 0)), 0.0, 0.0, 0)
+        limit = RESIDUAL_TWIST + ROUNDING * float(abs(z[n + idamax(z, self.tubes, n)]))
+        previous, iteration = np.inf, 0
+        while iteration < MOST_STEPS:
+            out = self.form.terms(np.sin(waves.dot(z)))
+            daxpy(z, out, n, 1.0, 0, 1, size)  # the gradient
+            _, info = dppsv(n, out, out[size:].reshape(self.form.sides, n).T, 0, 1)
+            if info:
+                return None
+            daxpy(out, z, n, -1.0, size)
+            iteration += 1
+            twist = self.twist_norm * dnrm2(out, n, size)
+            if twist > LAST_STEP:
+                if iteration > 1 and not twist < CONTRACTION * previous:
+                    return None
+                previous = twist
+                continue
+            checked = self._check(z, before, slack)
+            if checked is None:
+                return None
+            angles, residual, estimate, coarse = checked
+            if residual <= limit:
+                estimate = np.inf if coarse else estimate
+                return Served(self, z, angles, out[size + n :].reshape(-1, n), residual, estimate, iteration)
+        return None
+
+    def convex_around(self, angles: Array, reach: float) -> bool:
+        """True if the energy is certainly convex, at the finer degree, within ``reach`` [rad] of ``angles``."""
+        sines = np.sin(angles)
+        sines[-1] = reach
+        return self.n == 0 or dpptrf(self.finer, self.check_form.terms(sines))[1] == 0
+
+    def margin(self, served: Served) -> float:
+        """Smallest eigenvalue of the finer model's Hessian relative to torsional stiffness, clipped at 1."""
+        if self.n == 0:
+            return 1.0
+        hessian = self.check_form.unpacked(np.sin(served.angles))
+        values, _, info = dsyevd(hessian, 0, 1)
+        assert info == 0
+        return min(1.0, float(values[0]))
+
+    def may_be_untwisted(self, alpha: Array, goal: float) -> bool:
+        """A first look, from D and ``alpha`` alone, whether the twist moves the tip by no more than ``goal`` [m]."""
+        pull = 0.0
+        for first, second, strength, phase in self._first_twist:
+            pull += strength * math.sin(phase + alpha[second] - alpha[first])
+        return abs(pull) <= goal
+
+    def untwisted(self, alpha: Array, before: Array | None, slack: float) -> Served | None:
+        """The state without twist, eq. (28)-(31), and what it neglects; None if it is not certainly stable and on the
+        branch of ``before``."""
+        z = self.start(np.zeros(self.finer), alpha)
+        checked = self._check(z, before, slack)
+        if checked is None:
+            return None
+        none = np.zeros((self.tubes, self.n))
+        return Served(self, z, checked[0], none, checked[1], checked[2], 0)
+
+    def _check(self, z: Array, before: Array | None, slack: float) -> tuple[Array, float, float, bool] | None:
+        """Angles, residual and estimate at ``z``, and whether the finer model differs by more than the slack in which
+        the estimate holds; None if the finer model is not certainly convex around ``before`` and ``z``."""
+        angles = self.waves.dot(z)
+        if self.n == 0:
+            return angles, 0.0, 0.0, False
+        sines = np.sin(angles)
+        reach = slack
+        if before is not None:
+            moved = angles - before
+            turned = abs(moved[idamax(moved)])
+            if turned > LARGEST_TURN:
+                return None
+            reach += WIDER * turned
+        sines[-1] = reach
+        residual, change, info = self._factorised(z, sines)
+        if info and before is not None:
+            # Near a fold: bound every cosine by its own least value rather than all by the largest change.
+            sines[: self.rows], sines[-1] = self._least_cosines(before, moved, slack), 0.0
+            residual, change, info = self._factorised(z, sines)
+        if info:
+            return None
+        coarse = self.twist_norm * dnrm2(change) > slack
+        return angles, residual, dasum(self.weights.dot(change)), coarse
+
+    def _factorised(self, z: Array, sines: Array) -> tuple[float, Array, int]:
+        """Residual, Newton step of the finer model, and not 0 if its Hessian is not positive definite."""
+        size = self.check_form.size
+        out = self.check_form.terms(sines)
+        daxpy(z, out, self.n, 1.0, 0, 1, size)
+        residual = self.twist_norm * dnrm2(out, self.n, size)
+        change, info = dppsv(self.finer, out, out[size:], 0, 1)
+        return residual, change, info
+
+    def _least_cosines(self, before: Array, moved: Array, slack: float) -> Array:
+        """(R,) least cos(theta) on the way of ``moved`` from ``before``, and a share of it beyond either end."""
+        start, way = before[self.rows : 2 * self.rows], moved[self.rows : 2 * self.rows]
+        beyond = (WIDER - 1.0) * np.abs(way) + slack
+        end = start + way
+        return least_cosine(np.minimum(start, end) - beyond, np.maximum(start, end) + beyond)
+
+
+def _solved_for(energy: TorsionEnergy) -> NDArray[np.bool_]:
+    """(n,) true for the unknowns below the two highest degrees of their section; constants are always solved for."""
+    parts = []
+    for block in energy.space.blocks:
+        basis = block.basis
+        kept = np.arange(basis.degree + 1) <= max(0, basis.degree - FINER)
+        parts.append(np.tile(kept, block.frame.shape[1] * basis.panels))
+    return np.concatenate([np.zeros(0, dtype=bool), *parts])
+
+
+def _weights(energy: TorsionEnergy) -> Array:
+    """(W, n) motion of the tip [m] for the twist of each tube at each Gauss point, times a change of q.
+
+    Twist turns the curvature by |K_j kappa_j| / sum K per angle, which swings what lies beyond: no point farther off
+    than the arc length to the tip.
+    """
+    length = energy.materials.domain.length
+    parts = [np.zeros((0, energy.n))]
+    for node in energy.all_nodes:
+        arm = node.weight * (length - node.s) / node.bending.sum()
+        swing = arm[:, None] * node.bending * np.abs(node.kappa)
+        tubes = np.flatnonzero(swing.any(axis=0))
+        turned = energy.space.angle_map(node.section, node.rule.x)[:, tubes]
+        parts.append((swing[:, tubes, None] * turned).reshape(swing[:, tubes].size, energy.n))
+    return np.concatenate(parts)
