@@ -3,7 +3,7 @@ ROBOT ?= config/renda2021.yaml
 IN_ENV := scripts/in_env.sh
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo run test soak lint clean
+.PHONY: help setup demo run test soak bench lint clean
 
 help: ## show this list
 	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 15
@@ -27,6 +27,12 @@ test: lint ## lint, solver tests and node tests
 
 soak: setup ## the long tests
 	@$(IN_ENV) python3 -m pytest -m soak
+
+bench: setup ## speed against accuracy, measured here and charted: docs/speed_accuracy.*, docs/cost_growth.*
+	@$(IN_ENV) python3 bench/speed_accuracy.py
+	@$(IN_ENV) python3 bench/cost_growth.py
+	@$(IN_ENV) python3 bench/serving_cost.py
+	@$(IN_ENV) python3 bench/numba_kernel.py
 
 clean: ## remove everything that make has made
 	rm -rf .venv .ws demo .mypy_cache .pytest_cache .ruff_cache
