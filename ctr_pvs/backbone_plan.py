@@ -26,12 +26,11 @@ ComplexArray = NDArray[np.complex128]
 
 def backbone_plan(model: ServingModel, tolerance: float, tube: int | None) -> BackbonePlan:
     """The plan of ``model`` for ``tolerance`` [m] and ``tube`` (the leader if None), made when first asked for."""
-    key = (tolerance, tube)
-    plan: BackbonePlan | None = model.prepared.get(key)
-    if plan is None:
-        leader = model.energy.materials.domain.leader
-        plan = model.prepared[key] = BackbonePlan(model, tolerance, leader if tube is None else tube)
-    return plan
+    return model.prepare((tolerance, tube), lambda model: _plan(model, tolerance, tube))
+
+
+def _plan(model: ServingModel, tolerance: float, tube: int | None) -> BackbonePlan:
+    return BackbonePlan(model, tolerance, model.energy.materials.domain.leader if tube is None else tube)
 
 
 class BackbonePlan:

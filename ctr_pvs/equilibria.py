@@ -205,7 +205,7 @@ class _Polish:
             message,
             self.tolerance,
             "torsion",
-            error_estimate=estimate,
+            known_estimate=estimate,
             residual=residual,
             iterations=spent,
             source=solution,

@@ -17,6 +17,7 @@ from ctr_pvs.backbone import poses
 from ctr_pvs.backbone import tip_pose
 from ctr_pvs.continuation import State
 from ctr_pvs.pieces import Piece
+from ctr_pvs.refine import INTEGRATION_SHARE
 from ctr_pvs.renda2021 import printed_forces
 from ctr_pvs.serve import Position
 from ctr_pvs.shape import Shape
@@ -36,8 +37,7 @@ class Equilibrium:
     alpha, D : (N,) the command [rad], [m].
     status, message : the outcome, in one word and in one line; ``success`` is true for "ok" and "snap".
     fidelity : model level; degrees_of_freedom : number of unknowns solved for.
-    error_estimate : bound of the motion [m] of any point of the backbone, the tip among them, that more unknowns would
-        bring (see ``serving``), plus what integration may add; NaN without an equilibrium.
+    known_estimate : of the tip error, where it was needed to solve; see ``error_estimate``.
     residual : bound of the twist [rad] that the unbalanced torque left after the solve would cause; NaN likewise.
     iterations : Newton iterations spent on the way from the start to this answer.
     snaps : the snaps on the way, each with its place on the path, the states before and after, and the energy released.
@@ -53,7 +53,7 @@ class Equilibrium:
     tolerance: float
     fidelity: str
     force_model: str = "virtual_work"
-    error_estimate: float = np.nan
+    known_estimate: float = np.nan
     residual: float = np.nan
     iterations: int = 0
     source: Position | Solution | None = field(default=None, repr=False)
@@ -66,6 +66,14 @@ class Equilibrium:
     @property
     def degrees_of_freedom(self) -> int:
         return self._solved.degrees_of_freedom
+
+    @cached_property
+    def error_estimate(self) -> float:
+        """Estimated tip error [m]: what two more polynomial degrees would change, and what integration may add.  NaN
+        without an equilibrium."""
+        if isinstance(self.source, Position):
+            return self.source.estimate + self.integration_tolerance
+        return self.known_estimate
 
     @cached_property
     def solution(self) -> Solution | None:
@@ -117,7 +125,7 @@ class Equilibrium:
     @property
     def integration_tolerance(self) -> float:
         """Share of the tolerance [m] that integrating the backbone may use."""
-        return 0.1 * self.tolerance
+        return INTEGRATION_SHARE * self.tolerance
 
     def twist(self, s: Array) -> Array:
         """psi (g, N) [rad] of each tube at arc lengths ``s`` (g,) [m]; NaN past a tube's tip."""

@@ -1,9 +1,13 @@
 """The smallest model that meets a tolerance: which polynomial degree each coupled section gets.
 
-The first choice comes from the base positions D alone.  Twist obeys a pendulum equation, theta'' = lambda sin(theta),
-whose solutions are analytic up to a distance of about pi / (2 sqrt(lambda)) from the section (of length 1), so Legendre
-coefficients fall geometrically, by the size rho of the Bernstein ellipse that reaches there (L. N. Trefethen,
-"Approximation Theory and Approximation Practice", chapter 8).  The estimate of the answer itself then has the last
+A degree is enough when no point of the backbone, the tip among them, is off by more than the tolerance.  Twist obeys a
+pendulum equation, theta'' = lambda sin(theta), whose solutions are analytic up to a distance of about
+pi / (2 sqrt(lambda)) from the section (of length 1), so their Legendre coefficients fall geometrically, by the size rho
+of the Bernstein ellipse that reaches there (L. N. Trefethen, "Approximation Theory and Approximation Practice", chapter
+8).  Twist of a high degree moves the tip much less than what lies before it, as the tip sums it up along the section
+with weights as smooth as the solution: the tip error falls by rho twice.
+
+The first choice of degrees comes from the base positions D alone.  The estimate of the answer itself then has the last
 word: degrees rise until it is met.  So the choice depends on command and tolerance and on nothing before them.
 """
 
@@ -12,6 +16,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ctr_pvs.basis import gauss_legendre
 from ctr_pvs.materials import Materials
@@ -20,10 +25,12 @@ from ctr_pvs.twist import panels_needed
 #: Degrees above the first choice, tried in turn until the estimate is within tolerance.
 RAISES = (0, 1, 3, 6, 10, 15, 21)
 LOWEST_DEGREE, HIGHEST_DEGREE = 1, 28
-#: Measured on random robots: how much faster than by rho coefficients fall, and what a turn of the pre-curvature
-#: along a section [rad] adds to its coupling, as a share of its square.
+#: Measured on random robots: how much faster than by rho coefficients fall, and what a turn of the pre-curvature or of
+#: the backbone along a section [rad] adds to its coupling, as a share of its square.
 FASTER = 1.5
 TURN_SHARE = 0.1
+#: How much of a twist of degree k is let count for the tip, over rho^-k.
+CAUTION = 15.0
 #: Gauss points for a first look at the pre-curvatures.
 GLANCE = 4
 
@@ -37,9 +44,7 @@ def first_degrees(materials: Materials, tolerance: float) -> tuple[int, ...]:
     swing = _swing(materials, int(coupled[0]))
     for m in coupled.tolist():
         coupling = materials.coupling(m)
-        panels = panels_needed(coupling)
-        bandwidth = (coupling + TURN_SHARE * _turn(materials, m) ** 2) / panels**2
-        degrees[m] = _degree(bandwidth, swing * min(1.0, coupling), tolerance)
+        degrees[m] = _degree(ellipse(materials, m), swing * min(1.0, coupling), tolerance)
     return tuple(degrees)
 
 
@@ -48,11 +53,22 @@ def raised_degrees(degrees: tuple[int, ...], by: int) -> tuple[int, ...]:
     return tuple(degree + by if degree else 0 for degree in degrees)
 
 
-def _degree(bandwidth: float, motion: float, tolerance: float) -> int:
-    """Degree at which a tip motion [m] that falls by rho with each degree is within tolerance [m]."""
-    width = math.pi / math.sqrt(max(bandwidth, 1e-6))
-    rho = FASTER * (width + math.hypot(width, 1.0))
-    needed = math.log(max(motion / tolerance, 1.0)) / math.log(rho) - 1.0
+def ellipse(materials: Materials, m: int) -> float:
+    """The size rho by which Legendre coefficients fall with each degree on the panels of section m."""
+    coupling = materials.coupling(m)
+    bandwidth = coupling + TURN_SHARE * _turn(materials, m) ** 2
+    width = math.pi / math.sqrt(max(bandwidth / panels_needed(coupling) ** 2, 1e-6))
+    return width + math.hypot(width, 1.0)
+
+
+def tip_share(rho: float, degree: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Share of a twist of each ``degree`` (...) of its Legendre polynomials that is taken to count for the tip."""
+    return np.minimum(1.0, CAUTION * rho ** -(degree - 1.0))
+
+
+def _degree(rho: float, motion: float, tolerance: float) -> int:
+    """Degree at which a motion [m] of the backbone that falls by rho with each degree is within tolerance [m]."""
+    needed = math.log(max(motion / tolerance, 1.0)) / math.log(FASTER * rho) - 1.0
     return min(max(LOWEST_DEGREE, math.ceil(needed)), HIGHEST_DEGREE)
 
 
@@ -67,7 +83,10 @@ def _swing(materials: Materials, first: int) -> float:
 
 
 def _turn(materials: Materials, m: int) -> float:
-    """Largest turn [rad] of a tube's pre-curvature along section m."""
+    """Largest turn [rad] of a tube's pre-curvature, and of the backbone if all bent it to the same side, along section
+    m."""
     segments = materials.domain.segment[m]
-    turns = [abs(materials.segment(j, segments[j]).turn) for j in materials.curved_tubes[m]]
-    return float(max(turns) * materials.domain.lengths[m])
+    turn = max(abs(materials.segment(j, int(segments[j])).turn) for j in materials.curved_tubes[m])
+    s = materials.domain.boundaries[m] + gauss_legendre(GLANCE).x * materials.domain.lengths[m]
+    bend = np.abs(materials.pre_curvature(m, s)) @ materials.bending[m] / materials.bending[m].sum()
+    return float((turn + bend.max()) * materials.domain.lengths[m])

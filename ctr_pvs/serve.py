@@ -39,7 +39,7 @@ Array = NDArray[np.float64]
 #: Share of the tolerance for the discretisation: two answers of different degrees are then within tolerance.
 DISCRETISATION_SHARE = 0.5
 #: How far the next finer model may differ [rad], as a multiple of tolerance over length, and within which bounds.
-SLACK, LEAST_SLACK, MOST_SLACK = 20.0, 1e-6, 0.05
+SLACK, LEAST_SLACK, MOST_SLACK = 100.0, 1e-6, 0.05
 #: The same at the edge of a fold, where a margin is left only within less.
 AT_A_FOLD = 1e-9
 #: Base positions whose models are kept.
@@ -94,6 +94,11 @@ class Position:
         return ServedSolution(self.served) if self.twists else TorsionlessSolution(self.served)
 
     @property
+    def estimate(self) -> float:
+        """Of the tip error by discretisation [m]."""
+        return self.served.tip_estimate
+
+    @property
     def margin(self) -> float:
         return self.served.model.margin(self.served)
 
@@ -135,10 +140,10 @@ class Server:
             return None
         if self.untwisted and lowest.may_be_untwisted(alpha, self.goal):
             flat = lowest.untwisted(alpha, _converted(lowest, last.served, last.alpha)[1], rungs.slack)
-            if flat is not None and flat.estimate <= self.goal:
+            if flat is not None and flat.bound <= self.goal:
                 return Position(alpha, D, [flat], False)
         trail: list[Served] = []
-        while not trail or (trail[-1].estimate > self.goal and len(trail) < len(RAISES)):
+        while not trail or (trail[-1].bound > self.goal and len(trail) < len(RAISES)):
             model = rungs[len(trail)]
             z, before = _guess(model, trail, last, alpha)
             served = model.solve(z, before, rungs.slack)
@@ -153,7 +158,7 @@ class Server:
         if self.untwisted and rungs[0].may_be_untwisted(state.alpha, self.goal):
             z = rungs[0].start(rungs[0].energy.space.coordinates(state.torques), state.alpha)
             flat = rungs[0].untwisted(state.alpha, rungs[0].waves.dot(z), rungs.slack)
-            if flat is not None and flat.estimate <= self.goal:
+            if flat is not None and flat.bound <= self.goal:
                 return Position(state.alpha, state.D, [flat], False)
         trail: list[Served] = []
         for index in range(len(RAISES)):
@@ -163,7 +168,7 @@ class Server:
             if served is None:
                 continue  # so near a fold that this degree does not have the branch
             trail.append(served)
-            if served.estimate <= self.goal:
+            if served.bound <= self.goal:
                 break
         return Position(state.alpha, state.D, trail) if trail else None
 

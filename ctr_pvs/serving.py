@@ -8,8 +8,10 @@ Newton step of the finer model is the estimate of what the coarser one leaves ou
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from collections.abc import Hashable
 from typing import Any
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +25,8 @@ from scipy.linalg.lapack import dsyevd
 
 from ctr_pvs.convexity import least_cosine
 from ctr_pvs.energy import TorsionEnergy
+from ctr_pvs.fidelity import ellipse
+from ctr_pvs.fidelity import tip_share
 from ctr_pvs.pair_form import PackedForm
 from ctr_pvs.pair_form import Pairs
 from ctr_pvs.solve import CONTRACTION
@@ -30,6 +34,7 @@ from ctr_pvs.solve import RESIDUAL_TWIST
 from ctr_pvs.twist import Degrees
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
 
 #: The check adds this many polynomial degrees: a Ritz value of low degree is optimistic.
 FINER = 2
@@ -53,23 +58,24 @@ class Served:
     """A stable equilibrium of ``model`` with all that the next step from it needs.
 
     z : (n + N + 1,) unknowns, base angles and 1.  angles : of ``Pairs.waves``.  answers : (N, n) minus dq / d alpha.
-    residual : largest twist [rad] that the unbalanced torque would cause.  estimate : [m], see ``ServingModel``.
+    residual : bound of the twist [rad] that the unbalanced torque would cause.
+    change : (n + extra,) minus the Newton step of the finer model.
+    bound : of the motion [m] of any point of the backbone by it; infinite where it is too long to be believed.
     """
 
-    __slots__ = ("angles", "answers", "estimate", "iterations", "model", "residual", "z")
+    __slots__ = ("angles", "answers", "bound", "change", "iterations", "model", "residual", "z")
 
     def __init__(
-        self,
-        model: ServingModel,
-        z: Array,
-        angles: Array,
-        answers: Array,
-        residual: float,
-        estimate: float,
-        iterations: int,
+        self, model: ServingModel, z: Array, angles: Array, residual: float, change: Array, bound: float
     ) -> None:
-        self.model, self.z, self.angles, self.answers = model, z, angles, answers
-        self.residual, self.estimate, self.iterations = residual, estimate, iterations
+        self.model, self.z, self.angles, self.residual = model, z, angles, residual
+        self.change, self.bound = change, bound
+        self.answers, self.iterations = model.no_answers, 0
+
+    @property
+    def tip_estimate(self) -> float:
+        """Estimate of the tip error [m]: as ``bound``, but high degrees count for as little as they do for the tip."""
+        return float(dasum(self.model.weights.dot(self.model.tip_shares * self.change)))
 
     @property
     def alpha(self) -> Array:
@@ -99,10 +105,11 @@ class ServingModel:
         self.form = PackedForm(self.pairs, self.n, tangents=True)
         self.check_form = PackedForm(self.pairs, self.finer, tangents=False)
         self.weights = _weights(energy)[:, self.order]
+        self.tip_shares = _tip_shares(energy, solved)[self.order]
         self.twist_norm = float(np.linalg.norm(energy.angle_map, axis=2).max(initial=0.0))
         self.tubes = energy.materials.robot.n_tubes
-        #: What outputs have prepared for this model, by what they need it for.
-        self.prepared: dict[Hashable, Any] = {}
+        self.no_answers = np.zeros((self.tubes, self.n))
+        self._prepared: dict[Hashable, Any] = {}
         self._first_twist = self._twist_at_first_order()
 
     def _twist_at_first_order(self) -> list[tuple[int, int, float, float]]:
@@ -119,6 +126,13 @@ class ServingModel:
             total = waves[np.all(self.pairs.turns == turn, axis=1)].sum()
             out.append((int(turn.argmin()), int(turn.argmax()), float(abs(total)), float(np.angle(total))))
         return out
+
+    def prepare(self, what: Hashable, make: Callable[[ServingModel], T]) -> T:
+        """Tables that an output needs of this model, made by ``make`` when first asked for."""
+        if what not in self._prepared:
+            self._prepared[what] = make(self)
+        made: T = self._prepared[what]
+        return made
 
     def spread(self, q: Array) -> Array:
         out = np.zeros(self.finer)
@@ -144,7 +158,7 @@ class ServingModel:
         """
         n, waves, size = self.n, self.waves, self.form.size
         if n == 0:
-            return Served(self, z, waves.dot(z), np.zeros((self.tubes, 0)), 0.0, 0.0, 0)
+            return self._check(z, None, slack)
         limit = RESIDUAL_TWIST + ROUNDING * float(abs(z[n + idamax(z, self.tubes, n)]))
         previous, iteration = np.inf, 0
         while iteration < MOST_STEPS:
@@ -161,13 +175,12 @@ class ServingModel:
                     return None
                 previous = twist
                 continue
-            checked = self._check(z, before, slack)
-            if checked is None:
+            served = self._check(z, before, slack)
+            if served is None:
                 return None
-            angles, residual, estimate, coarse = checked
-            if residual <= limit:
-                estimate = np.inf if coarse else estimate
-                return Served(self, z, angles, out[size + n :].reshape(-1, n), residual, estimate, iteration)
+            if served.residual <= limit:
+                served.answers, served.iterations = out[size + n :].reshape(-1, n), iteration
+                return served
         return None
 
     def convex_around(self, angles: Array, reach: float) -> bool:
@@ -196,18 +209,13 @@ class ServingModel:
         """The state without twist, eq. (28)-(31), and what it neglects; None if it is not certainly stable and on the
         branch of ``before``."""
         z = self.start(np.zeros(self.finer), alpha)
-        checked = self._check(z, before, slack)
-        if checked is None:
-            return None
-        none = np.zeros((self.tubes, self.n))
-        return Served(self, z, checked[0], none, checked[1], checked[2], 0)
+        return self._check(z, before, slack)
 
-    def _check(self, z: Array, before: Array | None, slack: float) -> tuple[Array, float, float, bool] | None:
-        """Angles, residual and estimate at ``z``, and whether the finer model differs by more than the slack in which
-        the estimate holds; None if the finer model is not certainly convex around ``before`` and ``z``."""
+    def _check(self, z: Array, before: Array | None, slack: float) -> Served | None:
+        """The state ``z``; None if the finer model is not certainly convex around it and ``before``."""
         angles = self.waves.dot(z)
         if self.n == 0:
-            return angles, 0.0, 0.0, False
+            return Served(self, z, angles, 0.0, np.zeros(0), 0.0)
         sines = np.sin(angles)
         reach = slack
         if before is not None:
@@ -225,7 +233,7 @@ class ServingModel:
         if info:
             return None
         coarse = self.twist_norm * dnrm2(change) > slack
-        return angles, residual, dasum(self.weights.dot(change)), coarse
+        return Served(self, z, angles, residual, change, np.inf if coarse else dasum(self.weights.dot(change)))
 
     def _factorised(self, z: Array, sines: Array) -> tuple[float, Array, int]:
         """Residual, Newton step of the finer model, and not 0 if its Hessian is not positive definite."""
@@ -252,6 +260,16 @@ def _solved_for(energy: TorsionEnergy) -> NDArray[np.bool_]:
         kept = np.arange(basis.degree + 1) <= max(0, basis.degree - FINER)
         parts.append(np.tile(kept, block.frame.shape[1] * basis.panels))
     return np.concatenate([np.zeros(0, dtype=bool), *parts])
+
+
+def _tip_shares(energy: TorsionEnergy, solved: NDArray[np.bool_]) -> Array:
+    """(n,) how much of a change of each unknown is let count for the tip: all of those solved for."""
+    shares = np.ones(energy.n)
+    for block in energy.space.blocks:
+        if block.basis.degree:
+            degree = np.tile(np.arange(block.basis.degree + 1), block.frame.shape[1] * block.basis.panels)
+            shares[block.columns] = tip_share(ellipse(energy.materials, block.section), degree)
+    return np.where(solved, 1.0, shares)
 
 
 def _weights(energy: TorsionEnergy) -> Array:

@@ -16,6 +16,7 @@ from ctr_pvs.energy import TorsionEnergy
 from ctr_pvs.jacobian import tip_jacobian
 from ctr_pvs.pieces import Piece
 from ctr_pvs.serving import Served
+from ctr_pvs.serving_loads import PreparedLoads
 from ctr_pvs.shape import Shape
 from ctr_pvs.shape import TorsionlessShape
 from ctr_pvs.shape import TorsionShape
@@ -112,6 +113,12 @@ class ServedSolution(TorsionSolution):
     def pieces(self, tolerance: float, tube: int | None = None) -> list[Piece]:
         return backbone_plan(self.served.model, tolerance, tube).pieces(self.served.z)
 
+    def loads(self) -> Loads:
+        return self.served.model.prepare("loads", PreparedLoads).loads(self.served.z)
+
+    def elastic_energy(self) -> float:
+        return self.served.model.prepare("loads", PreparedLoads).energy(self.served.z)
+
     def stability_margin(self) -> float:
         """Of the finer model that checks: a basis is optimistic."""
         return self.served.model.margin(self.served)
@@ -123,6 +130,9 @@ class TorsionlessSolution(ServedSolution):
     @cached_property
     def shape(self) -> TorsionlessShape:  # type: ignore[override]
         return TorsionlessShape(self.energy.space, self.alpha, self.q)
+
+    def loads(self) -> Loads:
+        return self.served.model.prepare("loads", PreparedLoads).loads(self.served.z, twists=False)
 
     @property
     def degrees_of_freedom(self) -> int:

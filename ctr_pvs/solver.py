@@ -21,7 +21,6 @@ from ctr_pvs.renda2021 import check_renda2021
 from ctr_pvs.robot import Robot
 from ctr_pvs.serve import Position
 from ctr_pvs.serve import Server
-from ctr_pvs.serving import Served
 from ctr_pvs.snap import Snap
 from ctr_pvs.status import NoEquilibriumError
 from ctr_pvs.status import Status
@@ -209,15 +208,17 @@ class EquilibriumSolver:
         full: Refined[FullSolution] | None = None,
     ) -> Equilibrium:
         """The answer, with its status and message."""
-        told: Served | Refined[FullSolution] = position.served if full is None else full
-        level = position.level if full is None else "full"
+        served = position.served
+        if full is None:
+            level, residual, missed = position.level, served.residual, served.bound > self.tolerance
+        else:
+            level, residual, missed = "full", full.residual, full.estimate > self.tolerance
         status, message = Status.OK, "stable equilibrium" + note
         if snaps:
             status, message = Status.SNAP, _snapped(snaps) + note
-        if told.estimate > self.tolerance:
-            status = Status.TOLERANCE_MISSED
-            needed = f"{self.tolerance:.1e} m were asked for"
-            message = f"tip error about {told.estimate:.1e} m at the {level} level, {needed}"
+        if missed:
+            estimate = position.estimate if full is None else full.estimate
+            status, message = self._missed(estimate, level) if estimate > self.tolerance else (status, message)
         return Equilibrium(
             position.alpha,
             position.D,
@@ -226,12 +227,16 @@ class EquilibriumSolver:
             self.tolerance,
             level,
             self.force_model,
-            told.estimate,
-            told.residual,
+            np.nan if full is None else full.estimate,
+            residual,
             iterations,
             position if full is None else full.solution,
             snaps,
         )
+
+    def _missed(self, estimate: float, level: str) -> tuple[Status, str]:
+        needed = f"{self.tolerance:.1e} m were asked for"
+        return Status.TOLERANCE_MISSED, f"tip error about {estimate:.1e} m at the {level} level, {needed}"
 
     def _failure(self, alpha: Array, D: Array, status: Status, message: str, iterations: int = 0) -> Equilibrium:
         return Equilibrium(

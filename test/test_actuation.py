@@ -72,7 +72,7 @@ def test_sum_rules(seed):
     rng = np.random.default_rng([seed, 99])
     robot = random_robot(rng, 2 + seed % 3)
     D, alpha = random_D(rng, robot), rng.uniform(-2.0, 2.0, robot.n_tubes)
-    answer = EquilibriumSolver(robot, tolerance=1e-9).solve(alpha, D)
+    answer = EquilibriumSolver(robot, tolerance=1e-10).solve(alpha, D)
     assert answer.success, answer.message
     assert abs(answer.torque.sum()) < 1e-12
     if answer.kink or not answer.shape.domain.n_sections:
