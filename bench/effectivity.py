@@ -98,7 +98,7 @@ def summary(verdicts: list[Verdict]) -> str:
     error, estimate = (np.array([getattr(v, name) for v in verdicts]) for name in ("error", "estimate"))
     tolerance = np.array([v.tolerance for v in verdicts])
     within, told = np.mean(error <= tolerance), np.mean(estimate >= error)
-    levels = Counter(v.fidelity for v in verdicts)
+    levels, unknowns = Counter(v.fidelity for v in verdicts), [v.unknowns for v in verdicts]
     ratio = estimate / np.maximum(error, 1e-16)
     marks = np.percentile(ratio, [0, 1, 10, 50, 90, 99])
     share = np.percentile(error / tolerance, [50, 90, 99, 100])
@@ -108,7 +108,10 @@ def summary(verdicts: list[Verdict]) -> str:
         ["estimate / error: least, 1, 10, 50, 90, 99 %", ", ".join(f"{mark:.2g}" for mark in marks)],
         ["error / tolerance: 50, 90, 99, 100 %", ", ".join(f"{mark:.2g}" for mark in share)],
         ["level chosen", ", ".join(f"{name} {count}" for name, count in sorted(levels.items()))],
-        ["unknowns: median, most", f"{np.median([v.unknowns for v in verdicts]):.0f}, {max(v.unknowns for v in verdicts)}"],
+        [
+            "unknowns: median, most",
+            f"{np.median([v.unknowns for v in verdicts]):.0f}, {max(v.unknowns for v in verdicts)}",
+        ],
     ]
     return table(["", "measured"], rows)
 

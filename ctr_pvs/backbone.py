@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ctr_pvs.pieces import ORIFICE
 from ctr_pvs.pieces import Piece
+from ctr_pvs.pieces import State
 
 Array = NDArray[np.float64]
 
@@ -49,24 +50,31 @@ class Backbone:
         return len(self.s)
 
 
-def end_position(pieces: Sequence[Piece]) -> Array:
-    """Position (3,) [m] of the far end of ``pieces``."""
-    state = ORIFICE
+def chain(pieces: Sequence[Piece]) -> list[State]:
+    """The states where each of ``pieces`` starts, and where the last one ends."""
+    states = [ORIFICE]
     for piece in pieces:
-        state = piece.advance(state)
+        states.append(piece.advance(states[-1]))
+    return states
+
+
+def position_of(state: State) -> Array:
+    """Position (3,) [m] of ``state``."""
     _, _, p, r, s = state
     return np.array((s - 2.0 * r, 2.0 * p.imag, -2.0 * p.real))
 
 
-def tip_pose(pieces: Sequence[Piece]) -> Pose:
-    """Pose of the material at the far end of ``pieces`` (one at least); its quaternion is continuous in the roll."""
-    state = ORIFICE
-    for piece in pieces:
-        state = piece.advance(state)
-    a, b, p, r, s = state
-    e = cmath.rect(1.0 / math.hypot(a.real, a.imag, b.real, b.imag), 0.5 * pieces[-1].end_roll)
+def orientation_of(state: State, roll: float) -> Array:
+    """Quaternion (4,) of material that is turned by ``roll`` [rad] against the Bishop frame of ``state``."""
+    a, b = state[:2]
+    e = cmath.rect(1.0 / math.hypot(a.real, a.imag, b.real, b.imag), 0.5 * roll)
     a, b = a * e, b * e.conjugate()
-    return Pose(np.array((s - 2.0 * r, 2.0 * p.imag, -2.0 * p.real)), np.array((a.imag, b.real, b.imag, a.real)))
+    return np.array((a.imag, b.real, b.imag, a.real))
+
+
+def tip_pose(pieces: Sequence[Piece], end: State) -> Pose:
+    """Pose of the material at the far ``end`` of ``pieces`` (one at least); its quaternion goes with the roll."""
+    return Pose(position_of(end), orientation_of(end, pieces[-1].end_roll))
 
 
 def poses(pieces: Sequence[Piece], s: Array) -> Backbone:

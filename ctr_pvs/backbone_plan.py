@@ -12,11 +12,15 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from ctr_pvs.backbone import Backbone
+from ctr_pvs.backbone import poses
 from ctr_pvs.basis import gauss_legendre
 from ctr_pvs.collocation import nodes_needed
 from ctr_pvs.pieces import Arc
 from ctr_pvs.pieces import Bend
 from ctr_pvs.pieces import Piece
+from ctr_pvs.pieces import State
+from ctr_pvs.pose_plan import PosePlan
 from ctr_pvs.sections import ABSENT
 from ctr_pvs.serving import ServingModel
 
@@ -52,6 +56,8 @@ class BackbonePlan:
         self.arcs: list[tuple[float, float]] = []
         self.bends: list[tuple[float, int]] = []
         self.order: list[bool] = []
+        self._arc_rates: list[tuple[float, float]] = []  # largest curvature and turning of each arc [1/m], [rad/m]
+        self._pose_plans: dict[int, PosePlan | None] = {}
         places, rolls = self._lay_out()
         self._tabulate(places)
         self.rolls = np.array(rolls).reshape(-1, model.waves.shape[1])
@@ -76,6 +82,55 @@ class BackbonePlan:
                 place, angle, bend = place + nodes, angle + nodes, bend + 1
         return pieces
 
+    def backbone(self, z: Array, pieces: list[Piece], states: list[State], count: int) -> Backbone:
+        """``count`` poses at equal spacing for ``z``, which gave ``pieces`` with these ``states`` at their ends."""
+        if count not in self._pose_plans:
+            nodes = self._gauss_points()
+            self._pose_plans[count] = None if nodes is None else PosePlan(self, count, nodes)
+        plan = self._pose_plans[count]
+        if plan is None:
+            return poses(pieces, np.linspace(0.0, sum(self.lengths), count))
+        return plan.poses(pieces, states, z)
+
+    @property
+    def lengths(self) -> list[float]:
+        """Of all pieces [m]."""
+        arcs, bends = iter(self.arcs), iter(self.bends)
+        return [next(arcs)[0] if is_arc else next(bends)[0] for is_arc in self.order]
+
+    def _gauss_points(self) -> list[int] | None:
+        """Gauss points from which poses on each piece can be interpolated; None if a piece would need too many."""
+        bends, arcs = iter(self.bends), iter(self._arc_rates)
+        out = []
+        for is_arc, length in zip(self.order, self.lengths, strict=True):
+            if not is_arc:
+                out.append(next(bends)[1])
+                continue
+            parts, nodes = nodes_needed(length, *next(arcs), 0.0, self._relative)
+            if parts > 1:
+                return None
+            out.append(nodes)
+        return out
+
+    @property
+    def arcs_first(self) -> list[int]:
+        """The pieces, all arcs before all bends."""
+        return sorted(range(len(self.order)), key=lambda index: not self.order[index])
+
+    def places(self, nodes: list[int]) -> Array:
+        """(K,) distances [m] of the Gauss points from the starts of their pieces, arcs first."""
+        return np.concatenate([self.lengths[index] * gauss_legendre(nodes[index]).x for index in self.arcs_first])
+
+    def roll_rows(self, nodes: list[int]) -> Array:
+        """(K, n + N + 1) from z to the rolls at the Gauss points, arcs first."""
+        arcs = self.arcs_first[: len(self.arcs)]
+        rows = [
+            self.rolls[3 * arc]
+            + self.lengths[index] * gauss_legendre(nodes[index]).x[:, None] * self.rolls[3 * arc + 1]
+            for arc, index in enumerate(arcs)
+        ]
+        return np.concatenate([*rows, self.rolls[3 * len(arcs) :]])
+
     def _lay_out(self) -> tuple[list[tuple[int, Array]], list[Array]]:
         """Fills ``arcs``, ``bends`` and ``order``; the places (section, x) of the curvatures, the rows of the rolls."""
         starts: list[tuple[int, Array]] = []
@@ -88,7 +143,7 @@ class BackbonePlan:
             else:
                 self._add_bends(m, inside, bend_rolls)
         if not self.order:  # nothing is out: a piece of no length carries the roll
-            self.arcs, self.order = [(0.0, 0.0)], [True]
+            self.arcs, self.order, self._arc_rates = [(0.0, 0.0)], [True], [(0.0, 0.0)]
             at_orifice = self._angle_rows(0, np.zeros(1))[0, self._tube]
             arc_rolls = [at_orifice, 0.0 * at_orifice, 0.0 * at_orifice]
         return starts + inside, arc_rolls + bend_rolls
@@ -110,6 +165,8 @@ class BackbonePlan:
         if curved:
             segment = self._materials.segment(curved[0], int(self._materials.domain.segment[m, curved[0]]))
             turn, turning = segment.turn, rates[curved[0]]
+        bend = float(np.abs(self._share(m, np.zeros(1))).sum())
+        self._arc_rates.append((bend, abs(turn) + 2.0 * self._fastest_twist(m)))
         self.arcs.append((length, turn))
         self.order.append(True)
         starts.append((m, np.zeros(1)))
@@ -129,10 +186,9 @@ class BackbonePlan:
         """Parts and Gauss points for panels of ``length`` [m], whatever the base angles."""
         materials = self._materials
         places = np.linspace(0.0, 1.0, 9)
-        s = materials.domain.boundaries[m] + places * materials.domain.lengths[m]
-        share = np.abs(materials.pre_curvature(m, s)) * materials.bending[m] / materials.bending[m].sum()
+        share = np.abs(self._share(m, places))
         present = np.flatnonzero(materials.domain.segment[m] != ABSENT)
-        twist = max(self._strongest[j] / materials.torsional[m, j] for j in present)
+        twist = self._fastest_twist(m)
         turn = max(abs(materials.segment(int(j), int(materials.domain.segment[m, j])).turn) for j in present)
         bend = float(share.sum(axis=1).max())
         step = float(materials.domain.lengths[m]) / (len(places) - 1)
@@ -146,6 +202,19 @@ class BackbonePlan:
         pairs = self._model.pairs
         bound: Array = np.abs(pairs.turns).T @ pairs.amplitude
         return bound
+
+    def _fastest_twist(self, m: int) -> float:
+        """Bound of the twist rates [rad/m] in section m."""
+        stiffness = self._materials.torsional[m]
+        present = stiffness > 0.0
+        return float((self._strongest[present] / stiffness[present]).max())
+
+    def _share(self, m: int, x: Array) -> ComplexArray:
+        """(g, N) what the pre-curvature of each tube adds to the backbone's at the places ``x`` of section m [1/m]."""
+        s = self._materials.domain.boundaries[m] + x * self._materials.domain.lengths[m]
+        bending = self._materials.bending[m]
+        share: ComplexArray = self._materials.pre_curvature(m, s) * (bending / bending.sum())
+        return share
 
     def _angle_rows(self, m: int, x: Array) -> Array:
         """(g, N, n + N + 1) from z to psi at the places ``x`` (g,) of section m."""
@@ -161,9 +230,8 @@ class BackbonePlan:
         angles, shares, place = [np.zeros((0, self._model.waves.shape[1]))], [np.zeros(0, complex)], [np.zeros(0, int)]
         start = 0
         for m, x in places:
-            s = materials.domain.boundaries[m] + x * materials.domain.lengths[m]
             tubes = materials.curved_tubes[m]
-            share = materials.pre_curvature(m, s) * materials.bending[m] / materials.bending[m].sum()
+            share = self._share(m, x)
             angles.append(self._angle_rows(m, x)[:, tubes].reshape(-1, self._model.waves.shape[1]))
             shares.append(share[:, tubes].ravel())
             place.append(np.repeat(start + np.arange(len(x)), len(tubes)))

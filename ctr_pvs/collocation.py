@@ -39,7 +39,7 @@ class Collocation:
     spinors (2, G + 2), rates (5, G + 1): what does not change in the tables of ``Bend.trace``, to be copied.
     """
 
-    __slots__ = ("end", "half_roll", "identity", "integrals", "ones", "pairs", "rates", "spinors", "weights")
+    __slots__ = ("end", "half_roll", "identity", "integrals", "ones", "pairs", "rates", "spinors", "start", "weights")
 
     def __init__(self, nodes: int) -> None:
         rule = gauss_legendre(nodes)
@@ -51,7 +51,7 @@ class Collocation:
         self.identity = np.eye(nodes, dtype=complex).ravel()
         self.ones = np.ones(nodes, dtype=complex)
         self.half_roll = 0.5 * np.vstack([first, np.eye(nodes), last])
-        self.end = last.copy()
+        self.start, self.end = first.copy(), last.copy()
         self.spinors = np.zeros((2, nodes + 2), dtype=complex)
         self.spinors[0, 0] = 1.0
         self.rates = np.zeros((5, nodes + 1))

@@ -13,10 +13,12 @@ from numpy.typing import NDArray
 from ctr_pvs.actuation import Loads
 from ctr_pvs.backbone import Backbone
 from ctr_pvs.backbone import Pose
+from ctr_pvs.backbone import chain
 from ctr_pvs.backbone import poses
 from ctr_pvs.backbone import tip_pose
 from ctr_pvs.continuation import State
 from ctr_pvs.pieces import Piece
+from ctr_pvs.pieces import State as PieceState
 from ctr_pvs.refine import INTEGRATION_SHARE
 from ctr_pvs.renda2021 import printed_forces
 from ctr_pvs.serve import Position
@@ -75,6 +77,13 @@ class Equilibrium:
             return self.source.estimate + self.integration_tolerance
         return self.known_estimate
 
+    @property
+    def reason(self) -> str:
+        """Why this level and these polynomial degrees, in one line."""
+        if isinstance(self.source, Position):
+            return self.source.reason
+        return f"{self.fidelity}: asked for; degrees were raised until two successive tips agreed"
+
     @cached_property
     def solution(self) -> Solution | None:
         """The state that all outputs are read from."""
@@ -100,17 +109,21 @@ class Equilibrium:
     @cached_property
     def tip(self) -> Pose:
         """Pose of the far end: material frame of the tube that reaches farthest (ties: the innermost)."""
-        return tip_pose(self._pieces)
+        return tip_pose(self._pieces, self._states[-1])
 
     @cached_property
     def _pieces(self) -> list[Piece]:
         return self._solved.pieces(self.integration_tolerance)
 
+    @cached_property
+    def _states(self) -> list[PieceState]:
+        return chain(self._pieces)
+
     def backbone(self, n: int) -> Backbone:
         """``n`` >= 2 poses at equal spacing from the orifice to the tip; x is the tangent, roll that of ``tip``."""
         if n < 2:
             raise ValueError(f"n: expected at least 2 poses (orifice and tip), got {n}")
-        return self.backbone_at(np.linspace(0.0, self.shape.domain.length, n))
+        return self._solved.backbone(self._pieces, self._states, self.integration_tolerance, n)
 
     def backbone_at(self, s: Array) -> Backbone:
         """Poses at increasing arc lengths ``s`` (g,) [m] between 0 and the robot's length."""

@@ -88,6 +88,10 @@ class Arc:
         self.length, self.curvature, self.turn, self.roll, self.roll_rate = length, curvature, turn, roll, roll_rate
 
     @property
+    def start_roll(self) -> float:
+        return self.roll
+
+    @property
     def end_roll(self) -> float:
         return self.roll + self.roll_rate * self.length
 
@@ -170,6 +174,10 @@ class Bend:
         self.length, self.curvature, self.roll = length, curvature, roll
         self.nodes = len(curvature)
         self._solution: tuple[ComplexArray, ComplexArray, complex, complex, complex, float] | None = None
+
+    @property
+    def start_roll(self) -> float:
+        return float(collocation(self.nodes).start.dot(self.roll))
 
     @property
     def end_roll(self) -> float:

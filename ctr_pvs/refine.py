@@ -14,7 +14,8 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ctr_pvs.backbone import end_position
+from ctr_pvs.backbone import chain
+from ctr_pvs.backbone import position_of
 from ctr_pvs.full import FullEnergy
 from ctr_pvs.full_solution import FullSolution
 from ctr_pvs.full_solution import solve_full
@@ -31,7 +32,7 @@ DEGREES = (5, 7, 9, 12, 16, 21, 28)
 #: Polynomial degrees of all strains at the `full` level.
 FULL_DEGREES = (2, 4, 6, 9, 12, 16, 20)
 #: Share of the tolerance that integrating the backbone may use, and how much looser the first rung is.
-INTEGRATION_SHARE = 0.1
+INTEGRATION_SHARE = 0.01
 LOOSER = 64.0
 
 
@@ -87,4 +88,4 @@ def _full_rungs(start: TorsionSolution) -> Iterator[_Rung[FullSolution] | None]:
 
 def tip_position(shape: Shape, tolerance: float) -> Array:
     """Tip (3,) [m], integrated for an error of ``tolerance`` [m]."""
-    return end_position(shape.pieces(tolerance))
+    return position_of(chain(shape.pieces(tolerance))[-1])

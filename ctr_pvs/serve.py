@@ -36,8 +36,6 @@ from ctr_pvs.solution import TorsionlessSolution
 
 Array = NDArray[np.float64]
 
-#: Share of the tolerance for the discretisation: two answers of different degrees are then within tolerance.
-DISCRETISATION_SHARE = 0.5
 #: How far the next finer model may differ [rad], as a multiple of tolerance over length, and within which bounds.
 SLACK, LEAST_SLACK, MOST_SLACK = 100.0, 1e-6, 0.05
 #: The same at the edge of a fold, where a margin is left only within less.
@@ -51,7 +49,7 @@ class Rungs:
 
     def __init__(self, robot: Robot, D: Array, tolerance: float) -> None:
         self.materials = Materials(robot, piecewise_domain(robot, D))
-        self.first = first_degrees(self.materials, DISCRETISATION_SHARE * tolerance)
+        self.first = first_degrees(self.materials, tolerance)
         length = max(self.materials.domain.length, tolerance)
         self.slack = min(max(LEAST_SLACK, SLACK * tolerance / length), MOST_SLACK)
         self._models: list[ServingModel] = []
@@ -99,6 +97,18 @@ class Position:
         return self.served.tip_estimate
 
     @property
+    def reason(self) -> str:
+        """Why this level and these degrees."""
+        model = self.served.model
+        if model.n == 0:
+            return f"{self.level}: no two curved tubes overlap, so nothing twists"
+        if not self.twists:
+            return f"torsionless: twist would move no point of the backbone by more than {self.served.bound:.1e} m"
+        degrees = "/".join(str(degree) for degree in model.degree if degree)
+        finer = f"two more would move no point of the backbone by more than {self.served.bound:.1e} m"
+        return f"torsion: {model.n} unknowns, polynomials of degree {degrees} where curved tubes overlap; {finer}"
+
+    @property
     def margin(self) -> float:
         return self.served.model.margin(self.served)
 
@@ -118,7 +128,7 @@ class Server:
 
     def __init__(self, robot: Robot, tolerance: float, untwisted: bool) -> None:
         self.robot, self.tolerance, self.untwisted = robot, tolerance, untwisted
-        self.goal = DISCRETISATION_SHARE * tolerance
+        self.goal = tolerance  # for a bound that is at least twice the largest error measured on random scenes
         self._longest_slide = LARGEST_SLIDE * max(tube.length for tube in robot.tubes)
         self._kept: OrderedDict[bytes, Rungs] = OrderedDict()
 

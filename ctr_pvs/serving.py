@@ -94,7 +94,7 @@ class ServingModel:
     that add up to a bound of the motion of any of its points, the tip among them.
     """
 
-    def __init__(self, energy: TorsionEnergy, degree: Degrees) -> None:
+    def __init__(self, energy: TorsionEnergy, degree: tuple[int, ...]) -> None:
         self.energy, self.degree = energy, degree
         solved = _solved_for(energy)
         self.order = np.concatenate([np.flatnonzero(solved), np.flatnonzero(~solved)])

@@ -11,10 +11,13 @@ from numpy.typing import NDArray
 
 from ctr_pvs.actuation import Loads
 from ctr_pvs.actuation import virtual_work_loads
+from ctr_pvs.backbone import Backbone
+from ctr_pvs.backbone import poses
 from ctr_pvs.backbone_plan import backbone_plan
 from ctr_pvs.energy import TorsionEnergy
 from ctr_pvs.jacobian import tip_jacobian
 from ctr_pvs.pieces import Piece
+from ctr_pvs.pieces import State
 from ctr_pvs.serving import Served
 from ctr_pvs.serving_loads import PreparedLoads
 from ctr_pvs.shape import Shape
@@ -42,6 +45,11 @@ class Solution(ABC):
         """The backbone for an integration error of ``tolerance`` [m]; rolls are those of ``tube``, the leader if
         None."""
         return self.shape.pieces(tolerance, tube)
+
+    def backbone(self, pieces: list[Piece], states: list[State], tolerance: float, count: int) -> Backbone:
+        """``count`` poses at equal spacing from the orifice to the tip of ``pieces``, which ``tolerance`` [m] gave;
+        ``states`` : where each piece starts, and where the last one ends."""
+        return poses(pieces, np.linspace(0.0, self.shape.domain.length, count))
 
     @abstractmethod
     def loads(self) -> Loads:
@@ -112,6 +120,9 @@ class ServedSolution(TorsionSolution):
 
     def pieces(self, tolerance: float, tube: int | None = None) -> list[Piece]:
         return backbone_plan(self.served.model, tolerance, tube).pieces(self.served.z)
+
+    def backbone(self, pieces: list[Piece], states: list[State], tolerance: float, count: int) -> Backbone:
+        return backbone_plan(self.served.model, tolerance, None).backbone(self.served.z, pieces, states, count)
 
     def loads(self) -> Loads:
         return self.served.model.prepare("loads", PreparedLoads).loads(self.served.z)
