@@ -108,10 +108,7 @@ def summary(verdicts: list[Verdict]) -> str:
         ["estimate / error: least, 1, 10, 50, 90, 99 %", ", ".join(f"{mark:.2g}" for mark in marks)],
         ["error / tolerance: 50, 90, 99, 100 %", ", ".join(f"{mark:.2g}" for mark in share)],
         ["level chosen", ", ".join(f"{name} {count}" for name, count in sorted(levels.items()))],
-        [
-            "unknowns: median, most",
-            f"{np.median([v.unknowns for v in verdicts]):.0f}, {max(v.unknowns for v in verdicts)}",
-        ],
+        ["unknowns: median, most", f"{np.median(unknowns):.0f}, {max(unknowns)}"],
     ]
     return table(["", "measured"], rows)
 

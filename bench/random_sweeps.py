@@ -1,11 +1,11 @@
 """Random command sweeps through folds, each judged by an independent fine-step tracker.
 
-    scripts/in_env.sh python3 bench/random_sweeps.py [--sweeps 10000] [--first 0]
+    scripts/in_env.sh python3 bench/random_sweeps.py [--sweeps 10000] [--first 0] [--commands 1]
 
 A sweep is a random robot of two or three tubes, a cold start at a random command and one long straight path from
-there; half of the paths slide as well as rotate.  The judge goes the same way in small steps (0.02 rad, 0.5 mm) with
-plain Newton at twice the polynomial degree, without tangent, certificate or landing: where its own branch ends it
-says so.  Counted are
+there, in one command or cut at random into several; half of the paths slide as well as rotate.  The judge goes the
+same way in small steps (0.02 rad, 0.5 mm) with plain Newton at twice the polynomial degree, without tangent,
+certificate or landing: where its own branch ends it says so.  Counted are
 
     right          the judge reached the end, the answer is its state and is not flagged
     flagged snap   the judge's branch ended where the solver reports its first snap; from the last landing on, the judge
@@ -23,14 +23,15 @@ from collections import Counter
 
 import numpy as np
 
+from ctr_pvs import Equilibrium
 from ctr_pvs import EquilibriumSolver
 from ctr_pvs import Robot
 from ctr_pvs import Segment
-from ctr_pvs import Status
 from ctr_pvs import Tube
 from ctr_pvs.continuation import CommandPath
 from ctr_pvs.continuation import State
 from ctr_pvs.models import Models
+from ctr_pvs.snap import Snap
 from ctr_pvs.solve import newton
 from ctr_pvs.stability import stability_margin
 
@@ -108,7 +109,22 @@ class Judge:
         return stability_margin(energy, result.q, state.alpha) if result.converged else -1.0
 
 
-def sweep(seed: int) -> tuple[str, str]:
+def travel(
+    solver: EquilibriumSolver, path: CommandPath, ends: np.ndarray
+) -> tuple[Equilibrium, list[tuple[float, Snap]]]:
+    """The answer at the end of ``path``, gone in commands that end at the fractions ``ends``, and the snaps with their
+    fractions; an answer without success if one was met."""
+    snaps, before = [], 0.0
+    for end in ends:
+        answer = solver.follow(*path.at(float(end)))
+        if not answer.success:
+            break
+        snaps += [(before + snap.t * (end - before), snap) for snap in answer.snaps]
+        before = end
+    return answer, snaps
+
+
+def sweep(seed: int, commands: int) -> tuple[str, str]:
     """Verdict on one sweep, and what to print of it."""
     rng = np.random.default_rng([seed, 2024])
     robot = random_robot(rng, 2 + seed % 2)
@@ -120,43 +136,51 @@ def sweep(seed: int) -> tuple[str, str]:
     first = solver.solve(alpha, D)
     if not first.success:
         return "honest failure", f"cold: {first.status.value}: {first.message}"
-    start = State(first.alpha, first.D, first.solution.shape.torques)
+    start = first.state
     if judge.margin(start) <= 0.0:
         return "UNSTABLE", "cold start"
-    answer = solver.follow(alpha_end, D_end)
+    path = CommandPath(alpha, D, alpha_end, D_end)
+    answer, snaps = travel(solver, path, np.append(np.sort(rng.random(commands - 1)), 1.0))
     if not answer.success:
         return "honest failure", f"{answer.status.value}: {answer.message}"
-    end = State(answer.alpha, answer.D, answer.solution.shape.torques)
+    end = answer.state
     if judge.margin(end) <= 0.0 or answer.stability_margin <= 0.0:
         return "UNSTABLE", answer.status.value
-    path = CommandPath(alpha, D, alpha_end, D_end)
+    return verdict(judge, path, start, end, snaps)
+
+
+def verdict(
+    judge: Judge, path: CommandPath, start: State, end: State, snaps: list[tuple[float, Snap]]
+) -> tuple[str, str]:
+    """What the judge says to the answer ``end``, with ``snaps`` on the way from ``start``."""
     reached, t = judge.go(path, start, 0.0)
-    if answer.status is Status.OK:
+    if not snaps:
         if t == 1.0 and judge.apart(reached, end) < SAME:
             return "right", ""
         return "WRONG BRANCH", f"judge ended at {t:.4f}, apart {judge.apart(reached, end) if t == 1.0 else np.nan:.3g}"
-    snap, last = answer.snaps[0], answer.snaps[-1]
+    (first, _), (last, landing) = snaps[0], snaps[-1]
     small = 3.0 / judge.steps(path)
-    if t == 1.0 or abs(t - snap.t) > small:
-        return "WRONG BRANCH", f"snap at {snap.t:.4f}, judge ended at {t:.4f}"
-    reached, t = judge.go(path, last.after, last.t)
-    if t == 1.0 and judge.apart(reached, end) < SAME and min(s.energy_released for s in answer.snaps) > -1e-12:
+    if t == 1.0 or abs(t - first) > small:
+        return "WRONG BRANCH", f"snap at {first:.4f}, judge ended at {t:.4f}"
+    reached, t = judge.go(path, landing.after, last)
+    if t == 1.0 and judge.apart(reached, end) < SAME and min(s.energy_released for _, s in snaps) > -1e-12:
         return "flagged snap", ""
-    return "WRONG BRANCH", f"after the landing at {last.t:.4f} the judge ended at {t:.4f}"
+    return "WRONG BRANCH", f"after the landing at {last:.4f} the judge ended at {t:.4f}"
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sweeps", type=int, default=10_000)
     parser.add_argument("--first", type=int, default=0, help="seed of the first sweep")
+    parser.add_argument("--commands", type=int, default=1, help="commands that each path is cut into")
     arguments = parser.parse_args()
     verdicts: Counter[str] = Counter()
     began = time.perf_counter()
     for seed in range(arguments.first, arguments.first + arguments.sweeps):
-        verdict, remark = sweep(seed)
-        verdicts[verdict] += 1
+        found, remark = sweep(seed, arguments.commands)
+        verdicts[found] += 1
         if remark:
-            print(f"sweep {seed}: {verdict}: {remark}", flush=True)
+            print(f"sweep {seed}: {found}: {remark}", flush=True)
     print(dict(verdicts), f"{time.perf_counter() - began:.0f} s")
     return int(verdicts["WRONG BRANCH"] + verdicts["UNSTABLE"] > 0)
 

@@ -34,6 +34,7 @@ from ctr_pvs.relaxed import relaxed_state
 from ctr_pvs.snap import land
 from ctr_pvs.solve import newton
 from ctr_pvs.stability import rechecked_margin
+from ctr_pvs.stability import relaxed_gain
 from ctr_pvs.stability import snap_reserve
 from ctr_pvs.stability import stability_margin
 
@@ -102,7 +103,7 @@ def tasks(alpha: Array) -> dict[str, Task]:
         "of it the certificate, once": lambda: form.convex_between(psi, other),
         "margin": lambda: stability_margin(energy, q, alpha),
         "margin with recheck": lambda: rechecked_margin(energy, q, alpha),
-        "reserve": lambda: snap_reserve(energy, q, alpha),
+        "reserve, the first at a D": lambda: snap_reserve(energy, q, alpha, relaxed_gain(energy)),
         "of it the relaxed state": lambda: relaxed_state(energy),
     }
 

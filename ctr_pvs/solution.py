@@ -24,6 +24,7 @@ from ctr_pvs.shape import Shape
 from ctr_pvs.shape import TorsionlessShape
 from ctr_pvs.shape import TorsionShape
 from ctr_pvs.stability import rechecked_margin
+from ctr_pvs.stability import relaxed_gain
 from ctr_pvs.stability import snap_reserve
 
 Array = NDArray[np.float64]
@@ -93,7 +94,7 @@ class TorsionSolution(Solution):
         return rechecked_margin(self.energy, self.q, self.alpha)
 
     def snap_reserve(self) -> float:
-        return snap_reserve(self.energy, self.q, self.alpha)
+        return snap_reserve(self.energy, self.q, self.alpha, relaxed_gain(self.energy))
 
     def tip_jacobian(self, tolerance: float) -> Array:
         return tip_jacobian(self.energy, self.shape, tolerance)
@@ -123,6 +124,10 @@ class ServedSolution(TorsionSolution):
 
     def backbone(self, pieces: list[Piece], states: list[State], tolerance: float, count: int) -> Backbone:
         return backbone_plan(self.served.model, tolerance, None).backbone(self.served.z, pieces, states, count)
+
+    def snap_reserve(self) -> float:
+        gain = self.served.model.prepare("relaxed gain", lambda model: relaxed_gain(model.energy))
+        return snap_reserve(self.energy, self.q, self.alpha, gain)
 
     def loads(self) -> Loads:
         return self.served.model.prepare("loads", PreparedLoads).loads(self.served.z)

@@ -37,19 +37,20 @@ def rechecked_margin(energy: TorsionEnergy, q: Array, alpha: Array) -> float:
     return min(margin, stability_margin(finer, finer.space.coordinates(energy.space.field(q)), alpha))
 
 
-def snap_reserve(energy: TorsionEnergy, q: Array, alpha: Array) -> float:
+def snap_reserve(energy: TorsionEnergy, q: Array, alpha: Array, relaxed: float) -> float:
     """What is left of det(d alpha / d psi_tip), as a share of its value at the relaxed robot of the same D.
 
-    1 at the relaxed robot, 0 at a fold, falling smoothly in between, while the margin stays at 1 until a snap is near.
-    It says how much less the tips' rotations are held by the bases (Gilbert, Hendrick, Webster, T-RO 2016).
-    NaN if no relaxed state was found.
+    relaxed : ``relaxed_gain`` there.  1 at the relaxed robot, 0 at a fold, falling smoothly in between, while the
+    margin stays at 1 until a snap is near.  It says how much less the tips' rotations are held by the bases (Gilbert,
+    Hendrick, Webster, T-RO 2016).  NaN if no relaxed state was found.
     """
-    if energy.n == 0:
-        return 1.0
+    return 1.0 if energy.n == 0 else relaxed / _tip_gain(energy, q, alpha)
+
+
+def relaxed_gain(energy: TorsionEnergy) -> float:
+    """det(d psi_tip / d alpha) of the relaxed robot; NaN if no relaxed state was found."""
     relaxed = relaxed_state(energy)
-    if relaxed is None:
-        return float("nan")
-    return _tip_gain(energy, relaxed.q, relaxed.alpha) / _tip_gain(energy, q, alpha)
+    return float("nan") if relaxed is None else _tip_gain(energy, relaxed.q, relaxed.alpha)
 
 
 def _tip_gain(energy: TorsionEnergy, q: Array, alpha: Array) -> float:
