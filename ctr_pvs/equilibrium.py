@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from dataclasses import field
 from dataclasses import replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +16,7 @@ from ctr_pvs.backbone import chain
 from ctr_pvs.backbone import poses
 from ctr_pvs.backbone import tip_pose
 from ctr_pvs.continuation import State
+from ctr_pvs.lazy import lazy
 from ctr_pvs.pieces import Piece
 from ctr_pvs.pieces import State as PieceState
 from ctr_pvs.refine import INTEGRATION_SHARE
@@ -69,7 +69,7 @@ class Equilibrium:
     def degrees_of_freedom(self) -> int:
         return self._solved.degrees_of_freedom
 
-    @cached_property
+    @lazy
     def error_estimate(self) -> float:
         """Estimated tip error [m]: what two more polynomial degrees would change, and what integration may add.  NaN
         without an equilibrium."""
@@ -84,7 +84,7 @@ class Equilibrium:
             return self.source.reason
         return f"{self.fidelity}: asked for; degrees were raised until two successive tips agreed"
 
-    @cached_property
+    @lazy
     def solution(self) -> Solution | None:
         """The state that all outputs are read from."""
         return self.source.solution if isinstance(self.source, Position) else self.source
@@ -106,16 +106,16 @@ class Equilibrium:
         """Twist and curvature fields."""
         return self._solved.shape
 
-    @cached_property
+    @lazy
     def tip(self) -> Pose:
         """Pose of the far end: material frame of the tube that reaches farthest (ties: the innermost)."""
         return tip_pose(self._pieces, self._states[-1])
 
-    @cached_property
+    @lazy
     def _pieces(self) -> list[Piece]:
         return self._solved.pieces(self.integration_tolerance)
 
-    @cached_property
+    @lazy
     def _states(self) -> list[PieceState]:
         return chain(self._pieces)
 
@@ -144,7 +144,7 @@ class Equilibrium:
         """psi (g, N) [rad] of each tube at arc lengths ``s`` (g,) [m]; NaN past a tube's tip."""
         return self.shape.angles_at(np.asarray(s, dtype=float))
 
-    @cached_property
+    @lazy
     def loads(self) -> Loads:
         """Actuation loads: by virtual work, or with the forces of eq. (41) where that force model was asked for."""
         loads = self._solved.loads()
@@ -174,23 +174,23 @@ class Equilibrium:
         """True if some D_j sits on a kink of the energy, where the holding force is an interval."""
         return bool(self.loads.kink.any())
 
-    @cached_property
+    @lazy
     def energy(self) -> float:
         """Elastic energy [J], straightening in the guide counted."""
         return self._solved.elastic_energy()
 
-    @cached_property
+    @lazy
     def stability_margin(self) -> float:
         """Smallest eigenvalue of the energy Hessian relative to torsional stiffness, clipped at 1; NaN without
         equilibrium."""
         return float("nan") if self.solution is None else self.solution.stability_margin()
 
-    @cached_property
+    @lazy
     def snap_reserve(self) -> float:
         """Early warning: 1 at the relaxed robot, 0 at a fold, falling smoothly where the margin still stands at 1."""
         return self._solved.snap_reserve()
 
-    @cached_property
+    @lazy
     def jacobian(self) -> Array:
         """(6, 2 N) rates of the tip: position [m] and rotation [rad] in base axes, by alpha [1/rad] then D [1/m]."""
         return self._solved.tip_jacobian(self.integration_tolerance)

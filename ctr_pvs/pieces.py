@@ -40,6 +40,17 @@ ONES = np.ones((4, 1))
 IMAGINARY = np.array(1j)
 
 
+def _chained(
+    a: complex, b: complex, p: complex, r: float, s: float, A: complex, B: complex, P: complex, R: float, h: float
+) -> State:
+    """The state (a, b, p, r, s) carried over a piece of length h that takes the identity to (A, B, P, R)."""
+    b_conj = b.conjugate()
+    beta, straight = b.real * b.real + b.imag * b.imag, h - 2.0 * R
+    p += a * a * P - b * b * P.conjugate() + straight * (a * b)
+    r += R + beta * straight + 2.0 * (a * b_conj * P).real
+    return a * A - b * B.conjugate(), a * B + b * A.conjugate(), p, r, s + h
+
+
 class ArcPlaces:
     """Places ``s`` (n,) [m] from the start of an arc; keeps the circular functions of the last few rates there."""
 
@@ -102,19 +113,18 @@ class Arc:
         if not k:
             ab = a * b
             return a, b, p + h * ab, r + h * (b.real * b.real + b.imag * b.imag), s + h
+        # From the identity: a = cos + n sin, b = m sin in a frame that turns with k, arguments omega s / 2.
         omega = math.hypot(turn, abs(k)) + TINY
-        a1, b1 = self._other(a, b, omega)
+        n, m = 1j * (turn / omega), k / omega
         x = 0.5 * omega * h
         cos, sin = math.cos(x), math.sin(x)
-        bulge, rise = sin * cos / omega, sin * sin / omega
-        f0, f2 = 0.5 * h + bulge, 0.5 * h - bulge
-        p += f0 * (a * b) + rise * (a * b1 + a1 * b) + f2 * (a1 * b1)
-        r += f0 * (b * b.conjugate()).real + 2.0 * rise * (b * b1.conjugate()).real + f2 * (b1 * b1.conjugate()).real
-        a, b = cos * a + sin * a1, cos * b + sin * b1
+        squares = 0.5 * h - sin * cos / omega
+        A, B = cos + n * sin, m * sin
         if turn:
             e = cmath.rect(1.0, 0.5 * turn * h)
-            a, b = a * e.conjugate(), b * e
-        return a, b, p, r, s + h
+            A, B = A * e.conjugate(), B * e
+        P, R = m * (sin * sin / omega + n * squares), (m.real * m.real + m.imag * m.imag) * squares
+        return (A, B, P, R, h) if s == 0.0 else _chained(a, b, p, r, s, A, B, P, R, h)
 
     def _other(self, a: complex, b: complex, omega: float) -> tuple[complex, complex]:
         """The a1, b1 of the turning frame a cos + a1 sin, b cos + b1 sin, arguments omega s / 2."""
@@ -207,12 +217,7 @@ class Bend:
         """The state at the end."""
         a, b, p, r, s = state
         _, _, A, B, P, R = self._solution or self.solve()
-        h = self.length
-        b_conj, A_conj = b.conjugate(), A.conjugate()
-        beta = (b * b_conj).real
-        p += a * a * P - b * b * P.conjugate() + (h - 2.0 * R) * (a * b)
-        r += R + beta * (h - 2.0 * R) + 2.0 * (a * b_conj * P).real
-        return a * A - b * B.conjugate(), a * B + b * A_conj, p, r, s + h
+        return (A, B, P, R, self.length) if s == 0.0 else _chained(a, b, p, r, s, A, B, P, R, self.length)
 
     @staticmethod
     def prepare(s: Array, length: float, nodes: int) -> BendPlaces:

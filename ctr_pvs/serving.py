@@ -75,6 +75,8 @@ class Served:
     @property
     def tip_estimate(self) -> float:
         """Estimate of the tip error [m]: as ``bound``, but high degrees count for as little as they do for the tip."""
+        if self.model.n == 0:
+            return 0.0
         return float(dasum(self.model.weights.dot(self.model.tip_shares * self.change)))
 
     @property
@@ -159,7 +161,6 @@ class ServingModel:
         n, waves, size = self.n, self.waves, self.form.size
         if n == 0:
             return self._check(z, None, slack)
-        limit = RESIDUAL_TWIST + ROUNDING * float(abs(z[n + idamax(z, self.tubes, n)]))
         previous, iteration = np.inf, 0
         while iteration < MOST_STEPS:
             out = self.form.terms(np.sin(waves.dot(z)))
@@ -178,10 +179,14 @@ class ServingModel:
             served = self._check(z, before, slack)
             if served is None:
                 return None
-            if served.residual <= limit:
+            if served.residual <= RESIDUAL_TWIST or served.residual <= self._rounding(z):
                 served.answers, served.iterations = out[size + n :].reshape(-1, n), iteration
                 return served
         return None
+
+    def _rounding(self, z: Array) -> float:
+        """Residual twist [rad] that counts as zero at large base angles, where cos and sin lose digits."""
+        return RESIDUAL_TWIST + ROUNDING * float(np.abs(z[self.n : -1]).max())
 
     def convex_around(self, angles: Array, reach: float) -> bool:
         """True if the energy is certainly convex, at the finer degree, within ``reach`` [rad] of ``angles``."""
@@ -220,7 +225,7 @@ class ServingModel:
         reach = slack
         if before is not None:
             moved = angles - before
-            turned = abs(moved[idamax(moved)])
+            turned = abs(moved.item(idamax(moved)))
             if turned > LARGEST_TURN:
                 return None
             reach += WIDER * turned
