@@ -25,7 +25,7 @@ class Pairs:
     """Every two tubes that pull each other at a Gauss point of ``energy``: R rows.
 
     amplitude, phase (R,) [J], [rad]; turns (R, N) = d theta / d alpha; map (R, n) = d theta / dq, with the columns of q
-    in the given ``order``.
+    in the given ``order``.  tubes : the two tubes of each pair; pair (R,) : which of them a row is about.
     """
 
     def __init__(self, energy: TorsionEnergy, order: NDArray[np.int64]) -> None:
@@ -33,6 +33,7 @@ class Pairs:
         product = energy.moment[:, first].conj() * energy.moment[:, second]
         node, pair = np.nonzero(product)
         product = product[node, pair]
+        self.tubes, self.pair = list(zip(first.tolist(), second.tolist(), strict=True)), pair
         first, second = first[pair], second[pair]
         self.amplitude = energy.coupling[node] * np.abs(product)
         self.phase = np.angle(product)

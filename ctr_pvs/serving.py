@@ -124,9 +124,10 @@ class ServingModel:
         stiffest = 1.0 + float(self.pairs.amplitude @ np.sum(self.form.map**2, axis=1))
         waves = pull * np.exp(1j * self.pairs.phase) / stiffest
         out = []
-        for turn in np.unique(self.pairs.turns, axis=0):
-            total = waves[np.all(self.pairs.turns == turn, axis=1)].sum()
-            out.append((int(turn.argmin()), int(turn.argmax()), float(abs(total)), float(np.angle(total))))
+        for index, (first, second) in enumerate(self.pairs.tubes):
+            total = waves[self.pairs.pair == index].sum()
+            if total:
+                out.append((first, second, float(abs(total)), float(np.angle(total))))
         return out
 
     def prepare(self, what: Hashable, make: Callable[[ServingModel], T]) -> T:

@@ -174,15 +174,15 @@ class TwistSpace:
         return out
 
     def _block_map(self, block: Block, m: int, x: Array) -> Array:
+        """(g or 1, N, columns) of ``angle_map``; 1 where it is the same everywhere."""
         modes = block.scale[:, None] * block.frame
         if block.section < 0:
             if m >= self.first:
-                return np.broadcast_to(modes, (len(x), *modes.shape))
+                return modes[None]
             return self._lead_share(m, x)[:, :, None] * modes
         # Past its own section a block's twist is complete: the integrals at x = 1.
         if block.section < m:
-            whole = (modes[:, :, None] * block.basis.tabulate(END)[1]).reshape(1, len(modes), -1)
-            return np.broadcast_to(whole, (len(x), *whole.shape[1:]))
+            return (modes[:, :, None] * block.basis.tabulate(END)[1]).reshape(1, len(modes), -1)
         integrals = block.basis.tabulate(x)[1]
         return (modes[None, :, :, None] * integrals[:, None, None, :]).reshape(len(x), len(modes), -1)
 
