@@ -9,9 +9,6 @@ from ctr_pvs import EquilibriumSolver
 
 Array = NDArray[np.float64]
 
-#: Until the solver has it, benches leave batches out.
-AVAILABLE = hasattr(EquilibriumSolver, "solve_batch")
-
 
 def batch_tips(solver: EquilibriumSolver, alpha: Array, D: Array) -> tuple[Array, int]:
     """Tips (M, 3) [m] of the commands ``alpha`` (M, N) [rad], ``D`` (M, N) [m], and how many have not succeeded."""

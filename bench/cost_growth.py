@@ -20,7 +20,6 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from batches import AVAILABLE
 from batches import batch_tips
 from batches import commands
 from clock import Stopwatch
@@ -115,9 +114,6 @@ def poses(numbers: tuple[int, ...], steps: int) -> Iterator[Point]:
 
 def batches(sizes: tuple[int, ...]) -> Iterator[Point]:
     """Cold commands of Fig. 4's robot: all at one D, and each at its own."""
-    if not AVAILABLE:
-        print("batches are left out: this solver has no solve_batch")
-        return
     for name, slide in (("commands at one D", 0.0), ("commands at any D", 0.02)):
         for size in sizes:
             alpha, D = commands(size, np.array([0.0, 1.0]), np.radians(150.0), PARTIAL_OVERLAP, slide)

@@ -22,7 +22,6 @@ from pathlib import Path
 
 import numpy as np
 import scipy
-from batches import AVAILABLE
 from batches import batch_tips
 from batches import commands
 from clock import Stopwatch
@@ -99,8 +98,6 @@ def tubes_table(many: int) -> str:
 
 def batch_table(size: int) -> str:
     """Time for each command of a cold batch, and memory."""
-    if not AVAILABLE:
-        return "This solver has no `solve_batch`: nothing to measure."
     rows = []
     for name, slide in (("all at one D", 0.0), ("each at its own D", 0.02)):
         alpha, D = commands(size, np.array([0.0, 1.0]), np.radians(150.0), PARTIAL_OVERLAP, slide)

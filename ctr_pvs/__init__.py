@@ -8,6 +8,7 @@
 
 from ctr_pvs.backbone import Backbone
 from ctr_pvs.backbone import Pose
+from ctr_pvs.batch import Batch
 from ctr_pvs.equilibrium import Equilibrium
 from ctr_pvs.errors import CommandError
 from ctr_pvs.errors import RobotError
@@ -23,6 +24,7 @@ from ctr_pvs.status import Status
 
 __all__ = [
     "Backbone",
+    "Batch",
     "CommandError",
     "Equilibrium",
     "EquilibriumSolver",

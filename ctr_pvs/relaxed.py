@@ -61,7 +61,7 @@ def _starts(energy: TorsionEnergy) -> list[Array]:
     _, vectors = np.linalg.eigh(moments.T @ moments.conj())
     phase = vectors[:, -1]
     aligned = np.where(np.abs(phase) > 1e-9, np.angle(np.where(phase == 0, 1.0, phase).conj()), 0.0)
-    aligned = _wrapped(aligned - aligned[0])
+    aligned = wrapped(aligned - aligned[0])
     tubes = len(phase)
     turns = product((0.0, np.pi), repeat=tubes - 1) if tubes <= MANY_TUBES else [(0.0,) * (tubes - 1)]
     return [np.zeros(tubes), *(aligned + np.array([0.0, *turn]) for turn in turns)]
@@ -84,12 +84,12 @@ def _minimum(energy: TorsionEnergy, start: Array) -> tuple[Array, Array] | None:
     else:
         return None
     q, alpha = joint.unpack(x)
-    alpha = _wrapped(alpha)
+    alpha = wrapped(alpha)
     polished = newton(energy, alpha, q)
     return (alpha, polished.q) if polished.converged else None
 
 
-def _wrapped(angle: Array) -> Array:
+def wrapped(angle: Array) -> Array:
     """Angles in (-pi, pi]; a rounding error past -pi counts as +pi."""
     return np.pi - (np.mod(np.pi - angle + 1e-9, 2.0 * np.pi) - 1e-9)
 

@@ -31,6 +31,7 @@ from ctr_pvs.pair_form import PackedForm
 from ctr_pvs.pair_form import Pairs
 from ctr_pvs.solve import CONTRACTION
 from ctr_pvs.solve import RESIDUAL_TWIST
+from ctr_pvs.solve import residual_limit
 from ctr_pvs.twist import Degrees
 
 Array = NDArray[np.float64]
@@ -41,8 +42,6 @@ FINER = 2
 #: A Newton step shorter than this [rad] leaves about its square: time to look at the residual.
 LAST_STEP = 2e-6
 MOST_STEPS = 8
-#: Rounding of cos and sin at large base angles.
-ROUNDING = 64.0 * float(np.finfo(float).eps)
 #: The branch between two states may leave the straight line between them by this share of the distance.
 WIDER = 1.25
 #: Largest change [rad] of the angle between two tubes in one step.
@@ -180,14 +179,10 @@ class ServingModel:
             served = self._check(z, before, slack)
             if served is None:
                 return None
-            if served.residual <= RESIDUAL_TWIST or served.residual <= self._rounding(z):
+            if served.residual <= RESIDUAL_TWIST or served.residual <= residual_limit(z[n:-1]):
                 served.answers, served.iterations = out[size + n :].reshape(-1, n), iteration
                 return served
         return None
-
-    def _rounding(self, z: Array) -> float:
-        """Residual twist [rad] that counts as zero at large base angles, where cos and sin lose digits."""
-        return RESIDUAL_TWIST + ROUNDING * float(np.abs(z[self.n : -1]).max())
 
     def convex_around(self, angles: Array, reach: float) -> bool:
         """True if the energy is certainly convex, at the finer degree, within ``reach`` [rad] of ``angles``."""

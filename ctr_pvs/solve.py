@@ -20,6 +20,8 @@ RESIDUAL_TWIST = 1e-11
 #: Newton has converged when a step is shorter than this [rad]: the next one would be about its square.
 LAST_STEP = 1e-8
 MAX_ITERATIONS = 12
+#: Rounding of cos and sin at large base angles, as a share of them.
+ROUNDING = 64.0 * float(np.finfo(float).eps)
 #: A step that is not shorter than the one before by this factor is not Newton converging.
 CONTRACTION = 0.5
 
@@ -55,7 +57,7 @@ def twist_size(energy: TorsionEnergy, q: Array) -> float:
 
 def residual_limit(alpha: Array) -> float:
     """Residual twist [rad] that counts as zero: cos and sin lose digits where base angles are many turns."""
-    return RESIDUAL_TWIST + 64.0 * np.finfo(float).eps * float(np.abs(alpha).max(initial=0.0))
+    return RESIDUAL_TWIST + ROUNDING * float(np.abs(alpha).max(initial=0.0))
 
 
 def newton(energy: TorsionEnergy, alpha: Array, q: Array, steps: int = MAX_ITERATIONS) -> NewtonResult:

@@ -8,6 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from numpy.typing import NDArray
 
+from ctr_pvs.batch import Batch
+from ctr_pvs.batch import BatchSolver
+from ctr_pvs.batch import Progress
 from ctr_pvs.continuation import State
 from ctr_pvs.equilibria import equilibria
 from ctr_pvs.equilibrium import Equilibrium
@@ -66,6 +69,7 @@ class EquilibriumSolver:
         self._models = Models(robot)
         self._server = Server(robot, self.tolerance, untwisted=fidelity == "auto")
         self._last: Position | None = None
+        self._batches: BatchSolver | None = None
 
     def follow(self, alpha: ArrayLike, D: ArrayLike, budget: float | None = None) -> Equilibrium:
         """Go from the last good answer to (alpha, D) along the straight path, through folds: ``solve`` with a warm
@@ -126,6 +130,22 @@ class EquilibriumSolver:
         if position is not None:
             return self._keep(position, (), position.iterations, "")
         return self._travelled(self._last.state, alpha, D, deadline, "")
+
+    def solve_batch(
+        self, alpha: ArrayLike, D: ArrayLike, start: str = "cold", progress: Progress | None = None
+    ) -> Batch:
+        """Many commands at once: the answers of cold starts to the rows of ``alpha`` [rad] and ``D`` [m] (M, N).
+
+        progress : called as progress(done, total) from time to time.  The warm start of ``solve`` stays as it is.
+
+        A row that the robot cannot take is told in the batch.  Raises ``CommandError`` for arrays that are no tables of
+        real numbers with a column per tube, ``FieldError`` for a wrong option.
+        """
+        _check_option("start", start, ("cold",))
+        if self._batches is None:
+            alone = EquilibriumSolver(self.robot, self.tolerance, self._level, self.force_model)
+            self._batches = BatchSolver(alone, self._level)
+        return self._batches.solve(alpha, D, progress)
 
     def _cold(self, alpha: Array, D: Array, deadline: float) -> Equilibrium:
         """The path from the relaxed robot at this D."""
