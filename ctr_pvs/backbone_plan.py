@@ -8,6 +8,7 @@ points, as many as the largest torques that the tubes can exert may ask for: a c
 from __future__ import annotations
 
 import math
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,23 +27,22 @@ from ctr_pvs.serving import ServingModel
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
+#: Section, places (g,) in [0, 1], and what the curvature there is multiplied by: half the length of a bend.
+Places: TypeAlias = tuple[int, Array, float]
 
 
 def backbone_plan(model: ServingModel, tolerance: float, tube: int | None) -> BackbonePlan:
     """The plan of ``model`` for ``tolerance`` [m] and ``tube`` (the leader if None), made when first asked for."""
-    return model.prepare((tolerance, tube), lambda model: _plan(model, tolerance, tube))
-
-
-def _plan(model: ServingModel, tolerance: float, tube: int | None) -> BackbonePlan:
-    return BackbonePlan(model, tolerance, model.energy.materials.domain.leader if tube is None else tube)
+    leader = model.energy.materials.domain.leader if tube is None else tube
+    return model.prepare((tolerance, leader), lambda model: BackbonePlan(model, tolerance, leader))
 
 
 class BackbonePlan:
     """Tables for ``model`` and an integration error of ``tolerance`` [m]; rolls are those of ``tube``.
 
     waves (2 W, n + N + 1) : from z to the angles whose sines are cos and sin of psi, tube by tube and place by place.
-    curvature (2 P, 2 W) : from these sines to the curvatures [1/m], real and imaginary parts by turns, of P places: the
-    starts of all arcs, then the Gauss points of all bends.
+    curvature (2 P, 2 W) : from these sines to P curvatures, real and imaginary parts by turns: at the starts of all
+    arcs [1/m], then at the Gauss points of all bends, times half their lengths [rad].
     rolls (3 arcs + Gauss points, n + N + 1) : from z to start, rate and turn of each arc, then rolls at Gauss points.
     bends : length and number of Gauss points of each; arcs : length and turn of the pre-curvature of each.
     order : kinds of the pieces along the rod, true for an arc.
@@ -131,10 +131,10 @@ class BackbonePlan:
         ]
         return np.concatenate([*rows, self.rolls[3 * len(arcs) :]])
 
-    def _lay_out(self) -> tuple[list[tuple[int, Array]], list[Array]]:
+    def _lay_out(self) -> tuple[list[Places], list[Array]]:
         """Fills ``arcs``, ``bends`` and ``order``; the places (section, x) of the curvatures, the rows of the rolls."""
-        starts: list[tuple[int, Array]] = []
-        inside: list[tuple[int, Array]] = []
+        starts: list[Places] = []
+        inside: list[Places] = []
         arc_rolls: list[Array] = []
         bend_rolls: list[Array] = []
         for m in range(self._materials.domain.n_sections):
@@ -156,7 +156,7 @@ class BackbonePlan:
         curved = self._materials.curved_tubes[m]
         return all(len(self._materials.segment(j, int(segments[j])).curvature) == 1 for j in curved)
 
-    def _add_arc(self, m: int, starts: list[tuple[int, Array]], rolls: list[Array]) -> None:
+    def _add_arc(self, m: int, starts: list[Places], rolls: list[Array]) -> None:
         length = float(self._materials.domain.lengths[m])
         start, end = self._angle_rows(m, np.array([0.0, 1.0]))
         rates = (end - start) / length
@@ -169,15 +169,15 @@ class BackbonePlan:
         self._arc_rates.append((bend, abs(turn) + 2.0 * self._fastest_twist(m)))
         self.arcs.append((length, turn))
         self.order.append(True)
-        starts.append((m, np.zeros(1)))
+        starts.append((m, np.zeros(1), 1.0))
         rolls += [start[self._tube], rates[self._tube], turning]
 
-    def _add_bends(self, m: int, inside: list[tuple[int, Array]], rolls: list[Array]) -> None:
+    def _add_bends(self, m: int, inside: list[Places], rolls: list[Array]) -> None:
         panels = self._model.energy.space.basis(m).panels
         length = float(self._materials.domain.lengths[m]) / panels
         parts, nodes = self._division(m, length)
         x = gauss_legendre(nodes, panels * parts).x
-        inside.append((m, x))
+        inside.append((m, x, 0.5 * length / parts))
         rolls.extend(self._angle_rows(m, x)[:, self._tube])
         self.bends += [(length / parts, nodes)] * (panels * parts)
         self.order += [False] * (panels * parts)
@@ -224,14 +224,14 @@ class BackbonePlan:
         rows[:, np.arange(model.tubes), model.n + np.arange(model.tubes)] = 1.0
         return rows
 
-    def _tabulate(self, places: list[tuple[int, Array]]) -> None:
+    def _tabulate(self, places: list[Places]) -> None:
         """Fills ``waves`` and ``curvature``."""
         materials = self._materials
         angles, shares, place = [np.zeros((0, self._model.waves.shape[1]))], [np.zeros(0, complex)], [np.zeros(0, int)]
         start = 0
-        for m, x in places:
+        for m, x, factor in places:
             tubes = materials.curved_tubes[m]
-            share = self._share(m, x)
+            share = factor * self._share(m, x)
             angles.append(self._angle_rows(m, x)[:, tubes].reshape(-1, self._model.waves.shape[1]))
             shares.append(share[:, tubes].ravel())
             place.append(np.repeat(start + np.arange(len(x)), len(tubes)))

@@ -175,14 +175,15 @@ class BendPlaces:
 class Bend:
     """Curvature k and roll given at the G Gauss nodes of a piece, solved by collocation over all of it.
 
-    length [m]; curvature (G,) [1/m], complex; roll (G,) [rad], the material's angle.  ``nodes_needed`` tells how many.
+    length [m]; half_bend (G,) [rad], complex: k length / 2; roll (G,) [rad], the material's angle.  ``nodes_needed``
+    tells how many.
     """
 
-    __slots__ = ("_solution", "curvature", "length", "nodes", "roll")
+    __slots__ = ("_solution", "half_bend", "length", "nodes", "roll")
 
-    def __init__(self, length: float, curvature: ComplexArray, roll: Array) -> None:
-        self.length, self.curvature, self.roll = length, curvature, roll
-        self.nodes = len(curvature)
+    def __init__(self, length: float, half_bend: ComplexArray, roll: Array) -> None:
+        self.length, self.half_bend, self.roll = length, half_bend, roll
+        self.nodes = len(half_bend)
         self._solution: tuple[ComplexArray, ComplexArray, complex, complex, complex, float] | None = None
 
     @property
@@ -200,7 +201,7 @@ class Bend:
         """
         if self._solution is None:
             table, h = collocation(self.nodes), self.length
-            half = self.curvature * np.array(complex(0.5 * h))
+            half = self.half_bend
             rows = np.empty((3, self.nodes), dtype=complex)  # conj(K), a, conj(b)
             matrix = table.pairs.dot(np.conjugate(half, rows[0]))
             matrix *= half.repeat(self.nodes)

@@ -103,7 +103,7 @@ class Shape(ABC):
         places = gauss_legendre(nodes, count).x
         k, roll = self.curvature(m, places), self.angle(m, places)[:, tube]
         cuts = [slice(start, start + nodes) for start in range(0, nodes * count, nodes)]
-        return [Bend(length / parts, k[cut], roll[cut]) for cut in cuts]
+        return [Bend(length / parts, 0.5 * length / parts * k[cut], roll[cut]) for cut in cuts]
 
     def _turn(self, m: int) -> float:
         """The fastest turn [rad/m] of a pre-curvature in section m."""

@@ -54,7 +54,7 @@ def rolls(psi):
 
 def bend(length, k, roll, nodes):
     s = length * gauss_legendre(nodes).x
-    return Bend(length, k(s), roll(s))
+    return Bend(length, 0.5 * length * k(s), roll(s))
 
 
 def random_rod(rng, count):
@@ -113,7 +113,7 @@ def test_pieces_against_an_integrator(seed):
 def test_the_last_pose_is_the_tip(seed):
     """With few nodes too: what lies between is less exact than the end, but runs into the same end."""
     rng = np.random.default_rng([seed, 62])
-    pieces = [Bend(0.05, 20 * np.exp(1j * rng.uniform(-3, 3, n)), rng.uniform(-9, 9, n)) for n in (3, 5, 4)]
+    pieces = [Bend(0.05, 0.5 * np.exp(1j * rng.uniform(-3, 3, n)), rng.uniform(-9, 9, n)) for n in (3, 5, 4)]
     pieces.insert(seed % 4, Arc(0.03, 12.0 - 5.0j, 9.0, 2.0, -3.0))
     backbone, tip = poses(pieces, np.linspace(0.0, 0.18, 7)), tip_pose(pieces, chain(pieces)[-1])
     assert backbone.position[-1] == pytest.approx(tip.position, abs=1e-15)
@@ -195,7 +195,7 @@ def test_the_rule_for_the_number_of_nodes(twist):
 
         def points(nodes, parts, h=h, k=k):
             y = [(gauss_legendre(nodes).x + part) / parts for part in range(parts)]
-            return poses([Bend(h / parts, k(part), np.zeros(nodes)) for part in y], x * h).position
+            return poses([Bend(h / parts, 0.5 * h / parts * k(part), np.zeros(nodes)) for part in y], x * h).position
 
         exact = points(20, 4)
         largest = np.abs(k(x)).max()
@@ -235,7 +235,7 @@ def test_quaternions_are_continuous_and_of_norm_one():
         nodes = gauss_legendre(6).x
         return [
             Arc(0.04, 20.0, 30.0, angle, 90.0),
-            Bend(0.03, k, angle + 3.6 + 2.0 * nodes**2),
+            Bend(0.03, 0.015 * k, angle + 3.6 + 2.0 * nodes**2),
             Arc(0.04, -18.0j, 0.0, angle + 5.6, -70.0),
         ]
 
