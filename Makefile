@@ -34,6 +34,7 @@ bench: setup ## speed against accuracy, measured here and charted: docs/speed_ac
 	@$(IN_ENV) python3 bench/serving_cost.py
 	@$(IN_ENV) python3 bench/numba_kernel.py
 	@$(IN_ENV) python3 bench/effectivity.py
+	@$(IN_ENV) python3 bench/node_latency.py
 
 clean: ## remove everything that make has made
 	rm -rf .venv .ws demo .mypy_cache .pytest_cache .ruff_cache

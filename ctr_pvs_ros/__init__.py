@@ -1,7 +1,7 @@
-"""The ROS 2 node around ctr_pvs: parameters, commands, stream, messages, report, service, node.
+"""The ROS 2 node around ctr_pvs: parameters, commands, stream, outputs, report, node; service beside it.
 
-That is the order in which a command travels. commands, stream and report hold the decisions and know nothing of a ROS
-graph; node wires them to topics.
+That is the order in which a command travels. commands, stream, outputs and turns hold the decisions and know nothing of
+ROS; messages, forms and markers make what is sent; node wires them to topics. The service has a process of its own.
 """
 
 import os

@@ -72,14 +72,12 @@ class LockStepClient:
             self._executor.spin_once(timeout_sec=0.05)
 
     def wait_for_node(self, timeout: float) -> None:
-        """Wait until every topic and the service have found the node."""
+        """Wait until every topic has found the node."""
         self.spin_until(self._connected, timeout, "equilibrium node")
 
     def _connected(self) -> bool:
-        return (
-            self._command.get_subscription_count() > 0
-            and all(self._node.count_publishers(output.topic_name) > 0 for output in self._outputs)
-            and self._solve.service_is_ready()
+        return self._command.get_subscription_count() > 0 and all(
+            self._node.count_publishers(output.topic_name) > 0 for output in self._outputs
         )
 
     def command(self, joints: Mapping[str, float], timeout: float) -> Reply:
@@ -108,7 +106,8 @@ class LockStepClient:
         )
 
     def solve(self, request: SolveEquilibrium.Request, timeout: float) -> SolveEquilibrium.Response:
-        """Call the service; raises NoReply."""
+        """Call the service, once it is there; raises NoReply."""
+        self.spin_until(self._solve.service_is_ready, timeout, "service")
         future = self._solve.call_async(request)
         self.spin_until(future.done, timeout, "service reply")
         return future.result()

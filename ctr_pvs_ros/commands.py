@@ -6,13 +6,16 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from dataclasses import replace
 from enum import StrEnum
 
 import numpy as np
+from numpy.typing import ArrayLike
 from numpy.typing import NDArray
 
 from ctr_pvs import CommandError
 from ctr_pvs import Robot
+from ctr_pvs.robot import Limits
 
 
 class Reason(StrEnum):
@@ -64,7 +67,39 @@ def joint_names(robot: Robot) -> tuple[str, ...]:
 
 def joint_positions(alpha: NDArray[np.float64], D: NDArray[np.float64]) -> list[float]:
     """Positions (2N,) [rad and m] in the order of `joint_names`."""
-    return np.column_stack((alpha, D)).ravel().tolist()
+    positions = [0.0] * (2 * len(alpha))
+    positions[0::2], positions[1::2] = alpha.tolist(), D.tolist()
+    return positions
+
+
+def narrowed(robot: Robot, rotation_limits: Sequence[float], translation_limits: Sequence[float]) -> Robot:
+    """The robot with limits inside its own: low and high of each tube in turn, outermost first; empty: no change.
+
+    Args:
+        rotation_limits: rad.
+        translation_limits: m.
+
+    Raises:
+        ValueError: a wrong count, or limits that leave no command.
+    """
+    alpha = _inside("rotation_limits", robot.limits.alpha, rotation_limits)
+    D = _inside("translation_limits", robot.limits.D, translation_limits)
+    return replace(robot, limits=Limits(alpha, D)) if rotation_limits or translation_limits else robot
+
+
+def _inside(
+    name: str, own: Sequence[tuple[float, float] | None], pairs: Sequence[float]
+) -> tuple[tuple[float, float] | None, ...]:
+    if not pairs:
+        return tuple(own)
+    if len(pairs) != 2 * len(own):
+        rule = f"a low and a high limit for each of {len(own)} tubes"
+        raise ValueError(f"{name}: expected {rule}, got {len(pairs)} numbers")
+    both = [own_pair or (-math.inf, math.inf) for own_pair in own]
+    return tuple(
+        (max(low, own_low), min(high, own_high))
+        for low, high, (own_low, own_high) in zip(pairs[0::2], pairs[1::2], both, strict=True)
+    )
 
 
 class CommandReader:
@@ -97,6 +132,13 @@ class CommandReader:
         complete = self._completed(named, leniency, last)
         values = np.array([complete[name] for name in self.names])
         return self._within_limits(values[0::2], values[1::2], leniency)
+
+    def check(self, alpha: ArrayLike, D: ArrayLike) -> Command:
+        """Rotations [rad] and translations [m], outermost first, as a command; raises RejectedCommand."""
+        try:
+            return Command(*self._robot.check_command(alpha, D))
+        except CommandError as error:
+            raise RejectedCommand(Reason.OUT_OF_LIMITS, str(error)) from error
 
     def _by_name(self, names: Sequence[str], positions: Sequence[float], leniency: Leniency) -> dict[str, float]:
         if not names and len(positions) > 0:
@@ -136,10 +178,7 @@ class CommandReader:
         if leniency.clamp_to_limits:
             alpha, D, notes = self._robot.clamp_command(alpha, D)
             return Command(alpha, D, tuple(notes))
-        try:
-            return Command(*self._robot.check_command(alpha, D))
-        except CommandError as error:
-            raise RejectedCommand(Reason.OUT_OF_LIMITS, str(error)) from error
+        return self.check(alpha, D)
 
 
 def _shown(names: Sequence[str], most: int = 4) -> str:

@@ -9,6 +9,7 @@ from geometry_msgs.msg import PoseArray
 from geometry_msgs.msg import PoseStamped
 from geometry_msgs.msg import Quaternion
 from numpy.typing import NDArray
+from rclpy.clock import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 from std_msgs.msg import Header
@@ -17,6 +18,14 @@ from std_msgs.msg import MultiArrayDimension
 from ctr_pvs import Backbone
 from ctr_pvs import Equilibrium
 from ctr_pvs_ros.commands import joint_positions
+
+
+def receipt_header(header: Header, clock: Clock, frame_id: str) -> Header:
+    """The header of what answers a message with `header`: its stamp, or for a zero stamp the time now."""
+    stamp = header.stamp
+    if stamp.sec == 0 and stamp.nanosec == 0:
+        stamp = clock.now().to_msg()
+    return Header(stamp=stamp, frame_id=frame_id)
 
 
 def pose_of(position: NDArray[np.float64], orientation: NDArray[np.float64]) -> Pose:

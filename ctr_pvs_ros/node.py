@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+import gc
 import signal
+import traceback
+from collections.abc import Callable
+from typing import Any
 
 import rclpy
+from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseArray
 from geometry_msgs.msg import PoseStamped
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock
 from rclpy.clock import ClockType
+from rclpy.duration import Duration
 from rclpy.exceptions import ParameterException
+from rclpy.executors import Executor
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy
 from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
@@ -24,21 +30,28 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 from std_msgs.msg import Float64MultiArray
 from std_msgs.msg import Header
+from visualization_msgs.msg import MarkerArray
 
-from ctr_pvs import CommandError
 from ctr_pvs import EquilibriumSolver
 from ctr_pvs import load_robot
-from ctr_pvs_interfaces.srv import SolveEquilibrium
 from ctr_pvs_ros import messages
 from ctr_pvs_ros import parameters
 from ctr_pvs_ros.commands import Command
 from ctr_pvs_ros.commands import CommandReader
 from ctr_pvs_ros.commands import Leniency
 from ctr_pvs_ros.commands import RejectedCommand
+from ctr_pvs_ros.commands import narrowed
+from ctr_pvs_ros.forms import Forms
+from ctr_pvs_ros.markers import TubeMarkers
+from ctr_pvs_ros.outputs import Output
+from ctr_pvs_ros.outputs import Outputs
+from ctr_pvs_ros.outputs import Picture
+from ctr_pvs_ros.outputs import Sent
 from ctr_pvs_ros.parameters import ParameterError
+from ctr_pvs_ros.parameters import Settings
 from ctr_pvs_ros.report import Report
-from ctr_pvs_ros.service import SolveService
-from ctr_pvs_ros.stream import Answer
+from ctr_pvs_ros.serialized import stamp_bytes
+from ctr_pvs_ros.service_process import ServiceProcess
 from ctr_pvs_ros.stream import Policy
 from ctr_pvs_ros.stream import Stream
 
@@ -48,6 +61,8 @@ EXIT_BAD_INPUT = 2
 START_FAULTS = (ParameterException, RuntimeError, ValueError)
 LOG_PERIOD = 2.0  # s; at most one line of a kind in this time
 WAKE_PERIOD = 0.1  # s; a signal is seen at the latest after this time
+CATCH_UP_PERIOD = 0.05  # s; late joiners wait no longer, and markers move no faster
+LAST_WORD = Duration(seconds=0.2)  # for viewers to hear that the tubes are gone
 
 NEWEST_WINS = QoSProfile(depth=1)
 LATE_JOINERS_SEE_THE_LAST = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -56,37 +71,48 @@ LATE_JOINERS_SEE_THE_LAST = QoSProfile(depth=1, durability=DurabilityPolicy.TRAN
 class EquilibriumNode(Node):
     """Serves the equilibria of one robot.
 
+    Args:
+        options: of rclpy's Node.
+
+    Attributes:
+        interrupted: whether a signal has ended one of its callbacks; who spins it should stop.
+
     Raises:
-        ParameterException, ValueError: its parameters or its robot file do not allow it; the message is one line.
+        ParameterException, RuntimeError, ValueError: its parameters, its middleware or its robot file do not allow it;
+            the message is one line.
     """
 
-    def __init__(self) -> None:
-        super().__init__(NODE_NAME)
+    def __init__(self, **options: Any) -> None:
+        super().__init__(NODE_NAME, **options)
+        self.interrupted = False
         parameters.declare(self)
         self._settings = parameters.read(self)
         self._robot = load_robot(self._settings.robot_file)
-        self._reader = CommandReader(self._robot)
+        self._reader = self._new_reader(self._settings)
         self._stream = Stream(self._new_solver())
-        self._service = SolveService(self._reader, self._new_solver())
         self._report = Report()
         initial = self._initial_command()
 
-        self._joints = self._output(JointState, "setpoint_js")
-        self._tip = self._output(PoseStamped, "setpoint_cp")
-        self._backbone = self._output(PoseArray, "backbone")
-        self._margin = self._output(Float64, "stability_margin")
-        self._arc_length = self._output(Float64MultiArray, "backbone_s") if self._settings.publish_backbone_s else None
+        self._outputs = self._new_outputs()
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 1)
-        self.create_subscription(JointState, "servo_jp", self._on_command, NEWEST_WINS)
-        self.create_service(SolveEquilibrium, "~/solve", self._on_solve)
-        # Diagnostics go on while simulated time stands still.
-        self.create_timer(1.0, self._publish_diagnostics, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._service = ServiceProcess(self, self._settings)
+        if initial is not None:
+            self._guarded(self._solve)(initial, self.get_clock().now().to_msg())
+        self.create_subscription(JointState, "servo_jp", self._guarded(self._on_command), NEWEST_WINS)
+        # Both go on while simulated time stands still.
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(CATCH_UP_PERIOD, self._guarded(self._outputs.catch_up), clock=steady)
+        self.create_timer(1.0, self._guarded(self._publish_diagnostics), clock=steady)
         self.add_on_set_parameters_callback(self._on_set_parameters)
         self.add_post_set_parameters_callback(self._after_set_parameters)
-
-        if initial is not None:
-            self._solve(initial, Header(stamp=self.get_clock().now().to_msg(), frame_id=self._settings.frame_id))
         self.get_logger().info(f"serving robot {self._robot.name!r} from {self._settings.robot_file}")
+
+    def destroy_node(self) -> None:
+        """Also takes the markers away and ends the service's process."""
+        self._outputs.clear()
+        self._markers.wait_for_all_acked(LAST_WORD)
+        self._service.stop()
+        super().destroy_node()
 
     def _new_solver(self) -> EquilibriumSolver:
         settings = self._settings
@@ -94,8 +120,31 @@ class EquilibriumNode(Node):
             self._robot, tolerance=settings.tolerance, fidelity=settings.fidelity, force_model=settings.force_model
         )
 
-    def _output(self, message_type: type, topic: str) -> Publisher:
-        return self.create_publisher(message_type, topic, LATE_JOINERS_SEE_THE_LAST)
+    def _new_reader(self, settings: Settings) -> CommandReader:
+        try:
+            return CommandReader(narrowed(self._robot, settings.rotation_limits, settings.translation_limits))
+        except ValueError as error:
+            raise ParameterError(f"parameters rotation_limits, translation_limits: {error}") from error
+
+    def _new_outputs(self) -> Outputs:
+        frame = self._settings.frame_id
+        forms, tubes = Forms(self._reader.names, frame), TubeMarkers(self._robot, frame)
+        outputs = [
+            self._output(Float64, "stability_margin", lambda sent: forms.margin(sent.equilibrium)),
+            self._output(JointState, "setpoint_js", lambda sent: forms.joints(sent.equilibrium, sent.stamp)),
+            self._output(PoseStamped, "setpoint_cp", lambda sent: forms.tip(sent.equilibrium, sent.stamp)),
+            self._output(PoseArray, "backbone", lambda sent: forms.backbone(sent.backbone, sent.stamp)),
+        ]
+        if self._settings.publish_backbone_s:
+            outputs.append(
+                self._output(Float64MultiArray, "backbone_s", lambda sent: messages.arc_length_of(sent.backbone))
+            )
+        self._markers = self.create_publisher(MarkerArray, "markers", LATE_JOINERS_SEE_THE_LAST)
+        picture = Picture(self._markers, lambda sent: tubes.of(sent.equilibrium, sent.stamp), tubes.none)
+        return Outputs(outputs, picture)
+
+    def _output(self, message_type: type, topic: str, encode: Callable[[Sent], Any]) -> Output:
+        return Output(self.create_publisher(message_type, topic, LATE_JOINERS_SEE_THE_LAST), encode)
 
     def _initial_command(self) -> Command | None:
         values = self._settings.initial_command
@@ -106,38 +155,54 @@ class EquilibriumNode(Node):
             rule = f"{count} rotations and {count} translations"
             raise ParameterError(f"parameter initial_command: expected {rule}, got {len(values)} numbers")
         try:
-            return Command(*self._robot.check_command(values[:count], values[count:]))
-        except CommandError as error:
+            return self._reader.check(values[:count], values[count:])
+        except RejectedCommand as error:
             raise ParameterError(f"parameter initial_command: {error}") from error
 
+    def _guarded(self, callback: Callable[..., None]) -> Callable[..., None]:
+        """A callback that tells of its failures instead of ending the node with them."""
+
+        def guarded(*arguments: Any) -> None:
+            try:
+                callback(*arguments)
+            except KeyboardInterrupt:  # the executor would log it as an error on its way out
+                self.interrupted = True
+            except Exception as error:
+                self._report.fault(f"{type(error).__name__}: {error}")
+                where = "".join(traceback.format_exc())
+                self.get_logger().error(f"internal error, please report it: {where}", throttle_duration_sec=LOG_PERIOD)
+
+        return guarded
+
     def _on_command(self, message: JointState) -> None:
-        header, header_age = self._header_for(message.header)
-        self._report.received(header_age)
+        stamp, age = self._stamp_for(message.header.stamp)
+        self._report.received(age)
         settings = self._settings
         leniency = Leniency(settings.merge_partial, settings.clamp_to_limits, settings.accept_nameless)
         try:
             command = self._reader.read(message.name, message.position, leniency, self._stream.last)
-            self._solve(command, header)
+            self._solve(command, stamp)
         except RejectedCommand as rejection:
             self._report.rejected(rejection)
             self.get_logger().warning(
                 f"command rejected: {rejection.reason.value}: {rejection}", throttle_duration_sec=LOG_PERIOD
             )
 
-    def _header_for(self, header: Header) -> tuple[Header, float | None]:
-        """The header of all that answers a message, and the message's age at receipt [s]; None: it had a zero stamp."""
+    def _stamp_for(self, stamp: Time) -> tuple[Time, float | None]:
+        """The stamp of all that answers a command, and the command's age at receipt [s]; None: it had a zero stamp."""
         now = self.get_clock().now()
-        sent = header.stamp.sec * 1_000_000_000 + header.stamp.nanosec
+        sent = stamp.sec * 1_000_000_000 + stamp.nanosec
         if sent == 0:
-            return Header(stamp=now.to_msg(), frame_id=self._settings.frame_id), None
-        return Header(stamp=header.stamp, frame_id=self._settings.frame_id), (now.nanoseconds - sent) * 1e-9
+            return now.to_msg(), None
+        return stamp, (now.nanoseconds - sent) * 1e-9
 
-    def _solve(self, command: Command, header: Header) -> None:
+    def _solve(self, command: Command, stamp: Time) -> None:
         settings = self._settings
         policy = Policy(settings.on_snap, settings.margin_warn, settings.margin_stop)
         answer = self._stream.follow(command, policy, settings.compute_budget)
         if answer.verdict.publish:
-            self._publish(answer, header)
+            stamped = stamp_bytes(stamp.sec, stamp.nanosec)
+            self._outputs.publish(Sent(answer.equilibrium, stamped, settings.backbone_poses))
         self._report.answered(command, answer)
         if command.notes:
             text = "command clamped: " + "; ".join(command.notes)
@@ -147,24 +212,11 @@ class EquilibriumNode(Node):
         elif answer.verdict.remark:
             self.get_logger().warning(answer.verdict.remark, throttle_duration_sec=LOG_PERIOD)
 
-    def _publish(self, answer: Answer, header: Header) -> None:
-        equilibrium = answer.equilibrium
-        backbone = equilibrium.backbone(self._settings.backbone_poses)
-        self._margin.publish(Float64(data=float(equilibrium.stability_margin)))
-        self._joints.publish(messages.joint_state_of(equilibrium, self._reader.names, Header(stamp=header.stamp)))
-        self._tip.publish(messages.tip_of(equilibrium, header))
-        self._backbone.publish(messages.backbone_of(backbone, header))
-        if self._arc_length is not None:
-            self._arc_length.publish(messages.arc_length_of(backbone))
-
-    def _on_solve(
-        self, request: SolveEquilibrium.Request, response: SolveEquilibrium.Response
-    ) -> SolveEquilibrium.Response:
-        header, _ = self._header_for(request.joints.header)
-        settings = self._settings
-        return self._service.answer(request, response, header, settings.backbone_poses, settings.compute_budget)
-
     def _publish_diagnostics(self) -> None:
+        if self._service.revive():
+            self.get_logger().error("the service's process ended unexpectedly and was started again")
+        if self._diagnostics.get_subscription_count() == 0:
+            return
         name = f"{self.get_fully_qualified_name().lstrip('/')}: equilibrium"
         status = self._report.status(name, self._robot.name, self._settings.command_timeout)
         header = Header(stamp=self.get_clock().now().to_msg())
@@ -172,13 +224,15 @@ class EquilibriumNode(Node):
 
     def _on_set_parameters(self, changed: list[Parameter]) -> SetParametersResult:
         try:
-            parameters.read(self, {parameter.name: parameter.value for parameter in changed})
+            self._new_reader(parameters.read(self, {parameter.name: parameter.value for parameter in changed}))
         except ParameterError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 
     def _after_set_parameters(self, changed: list[Parameter]) -> None:
         self._settings = parameters.read(self)
+        self._reader = self._new_reader(self._settings)
+        self._service.update(self._settings)
         if any(parameter.name == "on_snap" for parameter in changed):
             self._stream.release()
 
@@ -188,6 +242,7 @@ def main(args: list[str] | None = None) -> int:
     # Python's own handler instead of rclpy's, so that either signal also ends a solve that is under way.
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.default_int_handler)
+    node = None
     try:
         try:
             rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
@@ -202,15 +257,29 @@ def main(args: list[str] | None = None) -> int:
         # A second signal must not turn a clean end into a failure.
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, signal.SIG_IGN)
+        if node is not None:
+            node.destroy_node()
         rclpy.try_shutdown()
     return 0
 
 
-def _spin(node: Node) -> None:
-    executor = SingleThreadedExecutor()
+def _spin(node: EquilibriumNode) -> None:
+    # What is there by now stays: the garbage collector need not look through it again while commands wait.
+    gc.collect()
+    gc.freeze()
+    executor = _new_executor()
     executor.add_node(node)
-    while rclpy.ok():
+    while rclpy.ok() and not node.interrupted:
         executor.spin_once(timeout_sec=WAKE_PERIOD)
+
+
+def _new_executor() -> Executor:
+    """The quickest one there is: docs/node_latency.md. The first rclpy of Jazzy has no EventsExecutor."""
+    try:
+        from rclpy.experimental.events_executor import EventsExecutor
+    except ImportError:
+        return SingleThreadedExecutor()
+    return EventsExecutor()
 
 
 if __name__ == "__main__":

@@ -29,6 +29,8 @@ class Settings:
     initial_command: tuple[float, ...]
     publish_backbone_s: bool
     backbone_poses: int
+    rotation_limits: tuple[float, ...]
+    translation_limits: tuple[float, ...]
     on_snap: str
     command_timeout: float
     compute_budget: float
@@ -76,6 +78,16 @@ PARAMETERS: dict[str, ParameterRule] = {
     "backbone_poses": ParameterRule(
         60, "Number of poses on the backbone, both ends included.", bounds=(2, MAX_BACKBONE_POSES)
     ),
+    "rotation_limits": ParameterRule(
+        Parameter.Type.DOUBLE_ARRAY,
+        "Limits of the rotations within those of the robot file [rad]: low and high of each tube in turn, outermost "
+        "first. Unset or empty: the robot file's alone.",
+    ),
+    "translation_limits": ParameterRule(
+        Parameter.Type.DOUBLE_ARRAY,
+        "Limits of the translations within those of the robot file [m]: low and high of each tube in turn, outermost "
+        "first. Unset or empty: the robot file's alone.",
+    ),
     "on_snap": ParameterRule(
         "follow",
         "When a command makes the tubes snap: follow publishes the landing, hold keeps the answer before the snap, "
@@ -105,6 +117,9 @@ PARAMETERS: dict[str, ParameterRule] = {
     ),
 }
 
+#: Declared without a value; unset means empty.
+ARRAYS = tuple(name for name, rule in PARAMETERS.items() if rule.default is Parameter.Type.DOUBLE_ARRAY)
+
 
 class ParameterError(ValueError):
     """A parameter value that passes its type and range but breaks another rule."""
@@ -120,7 +135,8 @@ def read(node: Node, changed: Mapping[str, Any] | None = None) -> Settings:
     """The declared parameters as they are, or as they would be with `changed`; raises ParameterError."""
     values = {field.name: _value(node, field.name) for field in fields(Settings)}
     values.update({name: value for name, value in (changed or {}).items() if name in values})
-    values["initial_command"] = tuple(values["initial_command"] or ())
+    for name in ARRAYS:
+        values[name] = tuple(values[name] or ())
     settings = Settings(**values)
     _check(settings)
     return settings
@@ -149,8 +165,9 @@ def _check(settings: Settings) -> None:
             raise ParameterError(f"parameter {name}: expected one of {', '.join(rule.choices)}, got {value!r}")
     if not settings.robot_file:
         raise ParameterError("parameter robot_file: expected the path of a robot file, got nothing")
-    if not all(map(math.isfinite, settings.initial_command)):
-        raise ParameterError(f"parameter initial_command: expected finite numbers, got {settings.initial_command}")
+    for name in ARRAYS:
+        if not all(map(math.isfinite, getattr(settings, name))):
+            raise ParameterError(f"parameter {name}: expected finite numbers, got {getattr(settings, name)}")
     if settings.margin_stop > settings.margin_warn:
         limit = f"at most margin_warn ({settings.margin_warn:g})"
         raise ParameterError(f"parameter margin_stop: expected {limit}, got {settings.margin_stop:g}")

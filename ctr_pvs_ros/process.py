@@ -56,6 +56,11 @@ class NodeProcess:
         self._process = subprocess.Popen([executable, "--ros-args", *arguments], stdout=output, stderr=output)
 
     @property
+    def id(self) -> int:
+        """Of the process."""
+        return self._process.pid
+
+    @property
     def running(self) -> bool:
         """Whether the process is still there."""
         return self._process.poll() is None

@@ -10,6 +10,7 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from diagnostic_msgs.msg import KeyValue
 
+from ctr_pvs import Equilibrium
 from ctr_pvs import Status
 from ctr_pvs_ros.commands import Command
 from ctr_pvs_ros.commands import RejectedCommand
@@ -22,12 +23,17 @@ class Report:
     """Counts what happens to commands. Times are judged by receipt on a steady clock."""
 
     def __init__(self) -> None:
-        self._counts = Counter(accepted=0, published=0, rejected=0, clamped=0, snaps=0, zero_stamps=0)
+        self._counts = Counter(received=0, accepted=0, published=0, rejected=0, clamped=0, snaps=0, zero_stamps=0)
         self._reasons: Counter[str] = Counter()
         self._solve_times: deque[float] = deque(maxlen=SOLVE_TIMES_KEPT)
         self._answer: Answer | None = None
         self._last_rejection = ""
         self._last_clamp = ""
+        self._last_snap = ""
+        self._published: Equilibrium | None = None
+        self._fault = ""  # of the node itself; the next answer takes it back
+        self._faults = 0
+        self._rated = (time.monotonic(), 0)  # when the command rate was last told, and the commands until then
         self._news = ""  # the last thing to warn of since the last status, even if all went well after it
         self._received = time.monotonic()  # of the last command; until there is one, start-up
         self._header_age = float("nan")
@@ -35,6 +41,7 @@ class Report:
     def received(self, header_age: float | None) -> None:
         """A command came, its stamp `header_age` [s] before its receipt; None: it had a zero stamp."""
         self._received = time.monotonic()
+        self._counts["received"] += 1
         self._header_age = float("nan") if header_age is None else header_age
         self._counts["zero_stamps"] += header_age is None
 
@@ -45,13 +52,23 @@ class Report:
         self._last_rejection = f"{rejection.reason.value}: {rejection}"
         self._news = f"command rejected: {self._last_rejection}"
 
+    def fault(self, text: str) -> None:
+        """Something failed that should not; the last answer stays."""
+        self._fault = text
+        self._faults += 1
+
     def answered(self, command: Command, answer: Answer) -> None:
-        """The command was accepted and solved."""
+        """The command was accepted and solved, and its answer sent where the verdict says so."""
         self._answer = answer
+        self._fault = ""
         self._solve_times.append(answer.solve_time)
         self._counts["accepted"] += 1
         self._counts["published"] += answer.verdict.publish
-        self._counts["snaps"] += answer.equilibrium.status is Status.SNAP
+        if answer.equilibrium.status is Status.SNAP:
+            self._counts["snaps"] += 1
+            self._last_snap = f"{_tip(self._published)} -> {_tip(answer.equilibrium)}"
+        if answer.verdict.publish:
+            self._published = answer.equilibrium
         if answer.verdict.remark:
             self._news = answer.verdict.remark
         if command.notes:
@@ -73,6 +90,8 @@ class Report:
         )
 
     def _summary(self, command_timeout: float) -> tuple[bytes, str]:
+        if self._fault:
+            return DiagnosticStatus.ERROR, f"internal error: {self._fault}; the last answer stays"
         if self._answer is not None and not self._answer.verdict.publish:
             return DiagnosticStatus.ERROR, self._answer.verdict.remark
         age = self._age()
@@ -87,6 +106,12 @@ class Report:
         """Time without a command, s."""
         return time.monotonic() - self._received
 
+    def _rate(self) -> float:
+        """Commands per second since the last call."""
+        (since, before), (now, received) = self._rated, (time.monotonic(), self._counts["received"])
+        self._rated = now, received
+        return (received - before) / max(now - since, 1e-3)
+
     def _count_values(self) -> dict[str, str]:
         counts = self._counts
         return {
@@ -98,6 +123,9 @@ class Report:
             "commands clamped": str(counts["clamped"]),
             "last clamping": self._last_clamp,
             "snaps": str(counts["snaps"]),
+            "last snap, tip before -> after [m]": self._last_snap,
+            "internal errors": str(self._faults),
+            "command rate [1/s]": f"{self._rate():.1f}",
             "commands with zero stamp (receipt time used)": str(counts["zero_stamps"]),
             "time without a command [s]": f"{self._age():.3f}",
             "last command's stamp age at receipt [s]": f"{self._header_age:.6f}",
@@ -121,3 +149,10 @@ class Report:
             "solve time p95 [ms]": f"{p95:.3f}",
             "solve time max [ms]": f"{max(self._solve_times) * 1e3:.3f}",
         }
+
+
+def _tip(equilibrium: Equilibrium | None) -> str:
+    """Where the tip is [m], for people."""
+    if equilibrium is None or not equilibrium.success:
+        return "unknown"
+    return "({:.6f}, {:.6f}, {:.6f})".format(*equilibrium.tip.position)

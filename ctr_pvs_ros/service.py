@@ -9,21 +9,31 @@ from std_msgs.msg import Header
 
 from ctr_pvs import Equilibrium
 from ctr_pvs import EquilibriumSolver
+from ctr_pvs import Status
 from ctr_pvs_interfaces.srv import SolveEquilibrium
 from ctr_pvs_ros import messages
+from ctr_pvs_ros.commands import Command
 from ctr_pvs_ros.commands import CommandReader
 from ctr_pvs_ros.commands import RejectedCommand
 from ctr_pvs_ros.parameters import MAX_BACKBONE_POSES
+from ctr_pvs_ros.turns import Late
+from ctr_pvs_ros.turns import Turns
 
 BAD_INPUT = "bad_input"
 
 
 class SolveService:
-    """Answers SolveEquilibrium requests; `solver` must not be shared with the command stream."""
+    """Answers SolveEquilibrium requests from any number of threads.
+
+    Args:
+        reader: checks commands; may be replaced between requests.
+        solver: must not be shared with the command stream.
+    """
 
     def __init__(self, reader: CommandReader, solver: EquilibriumSolver) -> None:
-        self._reader = reader
+        self.reader = reader
         self._solver = solver
+        self._turns = Turns()
 
     def answer(
         self,
@@ -33,20 +43,24 @@ class SolveService:
         default_poses: int,
         budget: float,
     ) -> SolveEquilibrium.Response:
-        """Fill the response; the solve takes at most `budget` [s]. Never raises for bad input."""
+        """Fill the response within `budget` [s] and a little more. Never raises."""
         _fill_failure(response, header)
         poses = request.backbone_poses or default_poses
         try:
-            command = self._reader.read(request.joints.name, request.joints.position)
+            command = self.reader.read(request.joints.name, request.joints.position)
         except RejectedCommand as rejection:
-            return _refused(response, f"{rejection.reason.value}: {rejection}")
+            return _failed(response, BAD_INPUT, f"{rejection.reason.value}: {rejection}")
         if not 2 <= poses <= MAX_BACKBONE_POSES:
-            return _refused(response, f"backbone_poses: expected 0 or 2 to {MAX_BACKBONE_POSES}, got {poses}")
-        began = time.perf_counter()
-        equilibrium = self._solver.solve(
-            command.alpha, command.D, start="warm" if request.warm_start else "cold", budget=budget
-        )
-        response.solve_time = time.perf_counter() - began
+            rule = f"backbone_poses: expected 0 or 2 to {MAX_BACKBONE_POSES}, got {poses}"
+            return _failed(response, BAD_INPUT, rule)
+        start = "warm" if request.warm_start else "cold"
+        try:
+            solved = self._turns.take(lambda left: self._solve(command, start, left), budget)
+        except Late as late:
+            return _failed(response, Status.TIMEOUT.value, str(late))
+        except Exception as error:  # whatever went wrong, the client gets an answer
+            return _failed(response, Status.NOT_CONVERGED.value, f"internal error: {type(error).__name__}: {error}")
+        equilibrium, response.solve_time = solved
         response.success = equilibrium.success
         response.status = equilibrium.status.value
         response.message = equilibrium.message
@@ -54,9 +68,15 @@ class SolveService:
             _fill_answer(response, equilibrium, header, poses)
         return response
 
+    def _solve(self, command: Command, start: str, budget: float) -> tuple[Equilibrium, float]:
+        """The equilibrium, and the wall-clock time it took [s]."""
+        began = time.perf_counter()
+        equilibrium = self._solver.solve(command.alpha, command.D, start=start, budget=budget)
+        return equilibrium, time.perf_counter() - began
 
-def _refused(response: SolveEquilibrium.Response, message: str) -> SolveEquilibrium.Response:
-    response.status = BAD_INPUT
+
+def _failed(response: SolveEquilibrium.Response, status: str, message: str) -> SolveEquilibrium.Response:
+    response.status = status
     response.message = message
     return response
 

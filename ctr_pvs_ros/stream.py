@@ -47,10 +47,9 @@ def judge(equilibrium: Equilibrium, policy: Policy) -> Verdict:
         return Verdict(False, f"{equilibrium.status.value}: {equilibrium.message}; the last answer stays")
     if equilibrium.status is Status.SNAP and policy.on_snap != "follow":
         return Verdict(False, f"snap held (on_snap is {policy.on_snap}): {equilibrium.message}; the last answer stays")
-    if margin < policy.margin_stop:
-        return Verdict(
-            False, f"stability margin {margin:.3g} is below margin_stop ({policy.margin_stop:g}); the last answer stays"
-        )
+    if not (margin > 0.0 and margin >= policy.margin_stop):  # NaN counts as unstable
+        rule = f"below margin_stop ({policy.margin_stop:g})" if margin > 0.0 else "not above 0"
+        return Verdict(False, f"stability margin {margin:.3g} is {rule}; the last answer stays")
     if equilibrium.status is Status.SNAP:
         return Verdict(True, f"snap: {equilibrium.message}")
     if margin < policy.margin_warn:

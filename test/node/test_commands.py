@@ -1,6 +1,7 @@
 """Commands are matched by name, and refused with a reason."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -13,18 +14,24 @@ from ctr_pvs_ros.commands import CommandReader
 from ctr_pvs_ros.commands import Leniency
 from ctr_pvs_ros.commands import Reason
 from ctr_pvs_ros.commands import RejectedCommand
+from ctr_pvs_ros.commands import narrowed
 
 NAMES = ("outer_rotation", "outer_translation", "inner_rotation", "inner_translation")
 POSITIONS = (0.1, 0.02, -0.3, 0.04)
 
 
 @pytest.fixture
-def reader() -> CommandReader:
+def robot() -> Robot:
     tubes = tuple(
         Tube(name, (Segment(length, bending_stiffness=0.05, torsional_stiffness=0.04),))
         for name, length in (("outer", 0.1), ("inner", 0.2))
     )
-    return CommandReader(Robot("two", tubes))
+    return Robot("two", tubes)
+
+
+@pytest.fixture
+def reader(robot) -> CommandReader:
+    return CommandReader(robot)
 
 
 def test_joint_names_run_from_the_outermost_tube_inwards(reader):
@@ -103,3 +110,37 @@ def test_nameless_positions_are_taken_in_order_where_asked(reader):
     with pytest.raises(RejectedCommand) as caught:
         reader.read((), POSITIONS[:3], lenient)
     assert caught.value.reason is Reason.RAGGED
+
+
+def test_limits_may_be_narrowed_but_not_widened(robot):
+    narrow = narrowed(robot, [-1.0, 1.0, -2.0, 2.0], [0.0, 0.05, 0.0, 9.0])
+    narrower = narrowed(narrow, [-9.0, 9.0, -9.0, 0.5], [])
+    reader = CommandReader(narrower)
+    assert reader.read(NAMES, (-1.0, 0.05, 0.5, 0.2)).alpha.tolist() == [-1.0, 0.5]
+    for positions, word in (
+        ((-1.1, 0.02, 0.0, 0.04), "alpha[0]"),
+        ((0.0, 0.02, 0.6, 0.04), "alpha[1]"),
+        ((0.0, 0.06, 0.0, 0.07), "D[0]"),
+        ((0.0, 0.02, 0.0, 0.21), "D[1]"),
+    ):
+        with pytest.raises(RejectedCommand, match=re.escape(word)) as caught:
+            reader.read(NAMES, positions)
+        assert caught.value.reason is Reason.OUT_OF_LIMITS
+
+
+def test_no_limits_change_nothing(robot):
+    assert narrowed(robot, [], []) is robot
+
+
+@pytest.mark.parametrize(
+    ("rotation", "translation", "words"),
+    [
+        ([0.0, 1.0], [], "rotation_limits.*2 tubes.*2 numbers"),
+        ([], [0.0], "translation_limits.*2 tubes.*1 numbers"),
+        ([1.0, 0.0, 0.0, 1.0], [], "limits.alpha.outer"),
+        ([], [0.06, 0.1, 0.0, 0.05], "limits.D.inner"),
+    ],
+)
+def test_limits_that_make_no_sense_are_refused(robot, rotation, translation, words):
+    with pytest.raises(ValueError, match=words):
+        narrowed(robot, rotation, translation)

@@ -7,6 +7,7 @@ from pathlib import Path
 import yaml
 
 ROOT = Path(__file__).parents[2]
+WITHOUT_DEFAULT = {"robot_file", "initial_command", "rotation_limits", "translation_limits"}
 LAUNCH = ROOT / "launch" / "equilibrium.launch.xml"
 
 
@@ -79,7 +80,7 @@ def test_files_that_the_launch_file_names_are_installed():
 def test_the_parameter_file_holds_every_parameter_but_the_ones_without_a_default():
     content = yaml.safe_load((ROOT / "config" / "equilibrium_node.yaml").read_text(encoding="utf-8"))
     values = content["/**"]["ros__parameters"]
-    assert set(values) == declared_parameters() - {"robot_file", "initial_command"}
+    assert set(values) == declared_parameters() - WITHOUT_DEFAULT
 
 
 def test_both_packages_are_named_for_colcon():

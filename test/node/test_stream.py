@@ -59,6 +59,7 @@ def policy(on_snap="follow", margin_warn=0.2, margin_stop=0.1) -> Policy:
         (Outcome(), "follow", True, ""),
         (Outcome(stability_margin=0.15), "follow", True, "margin_warn"),
         (Outcome(stability_margin=0.05), "follow", False, "margin_stop"),
+        (Outcome(stability_margin=float("nan")), "follow", False, "nan"),
         (Outcome(Status.SNAP), "follow", True, "what the solver says"),
         (Outcome(Status.SNAP, stability_margin=0.05), "follow", False, "margin_stop"),
         (Outcome(Status.SNAP), "hold", False, "on_snap is hold"),
@@ -71,6 +72,13 @@ def test_verdicts(outcome, on_snap, publish, word):
     assert verdict.publish is publish
     assert word in verdict.remark
     assert bool(verdict.remark) is bool(word)
+
+
+@pytest.mark.parametrize("margin", [0.0, -0.1, float("nan")])
+def test_an_answer_that_is_not_stable_is_withheld_whatever_the_thresholds(margin):
+    verdict = judge(Outcome(stability_margin=margin), policy(margin_warn=0.0, margin_stop=0.0))
+    assert not verdict.publish
+    assert verdict.remark
 
 
 def test_a_withheld_answer_is_not_where_the_next_solve_starts():

@@ -25,6 +25,7 @@ if HAVE_ROS:
     import rclpy
     from diagnostic_msgs.msg import DiagnosticArray
     from diagnostic_msgs.msg import DiagnosticStatus
+    from rcl_interfaces.msg import ParameterDescriptor
     from rcl_interfaces.msg import SetParametersResult
     from rclpy.parameter import Parameter
     from rclpy.parameter import parameter_value_to_python
@@ -91,6 +92,12 @@ class Peer:
         future = self._parameters.get_parameters([name])
         self.wait(future.done, "parameter service")
         return parameter_value_to_python(future.result().values[0])
+
+    def describe_parameters(self, names: list[str]) -> list[ParameterDescriptor]:
+        """What the node says of its parameters."""
+        future = self._parameters.describe_parameters(names)
+        self.wait(future.done, "parameter service")
+        return future.result().descriptors
 
     def send(self, message: JointState) -> None:
         """Publish a command as it is."""

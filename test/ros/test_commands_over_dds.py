@@ -2,6 +2,7 @@
 
 import json
 import math
+import time
 from pathlib import Path
 
 import numpy as np
@@ -147,3 +148,26 @@ def test_diagnostics_tell_how_it_goes(peer):
     assert float(values["error estimate [m]"]) <= 1e-5
     assert int(values["degrees of freedom"]) > 0
     assert 0.0 <= float(values["last command's stamp age at receipt [s]"]) < 1.0
+    assert float(values["residual"]) <= 1e-5
+    assert values["fidelity"] in ("torsionless", "torsion")
+    assert 0.0 < float(values["snap reserve"]) <= 1.0
+    assert values["internal errors"] == "0"
+
+
+def test_the_command_rate_is_told(peer):
+    began = time.monotonic()
+    peer.diagnostics()
+    for count in range(40):
+        peer.client.command({**GOOD, "inner_rotation": 0.5 + 0.001 * count}, TIMEOUT)
+    _, values = peer.diagnostics()
+    assert 40 / (time.monotonic() - began) < float(values["command rate [1/s]"]) <= 50.0
+    _, values = peer.diagnostics()
+    assert float(values["command rate [1/s]"]) == 0.0
+
+
+def test_rejections_are_told_apart(peer):
+    """By reason, each with its count."""
+    _, values = peer.diagnostics()
+    told = dict(part.split(": ") for part in values["rejected by reason"].split(", "))
+    assert sum(map(int, told.values())) == int(values["commands rejected"])
+    assert told["missing_joint"] == "2"

@@ -16,6 +16,18 @@ GOOD = dict(zip(JOINTS, (0.0, 0.0935, 0.5, 0.2085), strict=True))
 TIMEOUT = 5.0
 
 
+def other_value(default):
+    """A value of the same type that is not the default one."""
+    match default:
+        case bool():
+            return not default
+        case float():
+            return default / 2.0
+        case str():
+            return f"{default}x"
+    return [0.0, 0.5, 0.0935, 0.2085]
+
+
 @pytest.fixture(scope="module")
 def lenient(start_node):
     return start_node(
@@ -110,7 +122,10 @@ def test_an_answer_near_a_fold_is_withheld(strict):
         ("compute_budget", 1, "type"),
         ("on_snap", "jump", "follow, hold, stop"),
         ("margin_stop", 0.999, "margin_warn"),
-        ("robot_file", "other.yaml", "read-only"),
+        ("rotation_limits", [0.0, 1.0], "2 tubes"),
+        ("rotation_limits", [0.0, 1.0, 1.0, 0.0], "limits.alpha.inner"),
+        ("translation_limits", [0.0, float("inf"), 0.0, 1.0], "finite"),
+        *((name, other_value(rule.default), "read-only") for name, rule in PARAMETERS.items() if rule.read_only),
     ],
 )
 def test_a_wrong_value_is_refused_with_the_reason(strict, name, value, words):
@@ -122,6 +137,26 @@ def test_a_wrong_value_is_refused_with_the_reason(strict, name, value, words):
 def test_a_right_value_takes_effect(strict):
     assert strict.set_parameter("backbone_poses", 3).successful
     assert len(strict.client.command(GOOD, TIMEOUT).backbone.poses) == 3
+
+
+def test_limits_may_be_narrowed_while_running(strict):
+    assert strict.set_parameter("rotation_limits", [-1.0, 1.0, -0.4, 0.4]).successful
+    _, counts = strict.diagnostics()
+    strict.send(JointState(name=JOINTS, position=list(GOOD.values())))
+    _, values = strict.diagnostics(lambda values: values["commands rejected"] != counts["commands rejected"])
+    assert values["last rejection"].startswith("out_of_limits: alpha[1]")
+    assert strict.set_parameter("rotation_limits", [-7.0, 7.0, -7.0, 7.0]).successful
+    assert strict.client.command(GOOD, TIMEOUT).joints.position[2] == GOOD["inner_rotation"]
+
+
+def test_every_parameter_is_described(strict):
+    future = strict.describe_parameters(list(PARAMETERS))
+    for descriptor, (name, rule) in zip(future, PARAMETERS.items(), strict=True):
+        assert descriptor.name == name
+        assert descriptor.description
+        assert descriptor.read_only == rule.read_only
+        ranges = [*descriptor.integer_range, *descriptor.floating_point_range]
+        assert [(bounds.from_value, bounds.to_value) for bounds in ranges] == [rule.bounds] * (rule.bounds is not None)
 
 
 def test_nodes_in_two_namespaces_do_not_hear_each_other(strict, lenient):

@@ -1,22 +1,35 @@
 """The service ~/solve."""
 
 import math
+import os
+import signal
+import time
+from contextlib import suppress
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
 from sensor_msgs.msg import JointState
 
 from ctr_pvs_interfaces.srv import SolveEquilibrium
+from ctr_pvs_ros.client import NoReply
 
 JOINTS = ["outer_rotation", "outer_translation", "inner_rotation", "inner_translation"]
 POSITIONS = [0.0, 0.0935, math.radians(100), 0.2085]
 TIMEOUT = 5.0
+ENDLESS = [0.0, 0.0935, 1e6, 0.2085]  # so many turns that following them ends with the budget
+GRACE = 0.1  # s, over the budget
 
 
 @pytest.fixture(scope="module")
 def peer(start_node):
     # Leniencies are for the stream only.
     return start_node("/service", merge_partial="true", clamp_to_limits="true")
+
+
+def request_for(positions):
+    return SolveEquilibrium.Request(joints=JointState(name=JOINTS, position=list(positions)))
 
 
 def call(peer, names=JOINTS, positions=POSITIONS, **fields):
@@ -98,3 +111,66 @@ def test_the_stream_is_not_disturbed(peer):
         assert counts[key] == counts_after[key]
     peer.client.command({**command, "inner_rotation": 1.0}, TIMEOUT)
     assert peer.client.command(command, TIMEOUT).tip.pose == before.tip.pose
+
+
+def test_a_service_whose_process_dies_comes_back(peer):
+    def processes():
+        """Those that serve this node."""
+        listing = Path(f"/proc/{peer.process.id}/task/{peer.process.id}/children").read_text(encoding="ascii")
+        return [int(number) for number in listing.split()]
+
+    (child,) = processes()
+    os.kill(child, signal.SIGKILL)
+    peer.wait(lambda: processes() not in ([], [child]), "a new process")
+    for _ in range(20):  # the dead one is believed to be there for some time, and requests go to it
+        with suppress(NoReply):
+            if peer.client.solve(request_for(POSITIONS), 0.5).success:
+                break
+    else:
+        pytest.fail("the service does not come back")
+    assert "started again" in peer.log.read_text(encoding="utf-8")
+
+
+def test_parameters_reach_the_service(peer):
+    assert peer.set_parameter("backbone_poses", 4).successful
+    assert len(call(peer).backbone.poses) == 4
+    assert peer.set_parameter("rotation_limits", [0.0, 0.0, -1.0, 1.0]).successful
+    response = call(peer)
+    assert response.status == "bad_input" and "alpha[1]" in response.message
+    assert peer.set_parameter("rotation_limits", [-9.0, 9.0, -9.0, 9.0]).successful
+    assert call(peer).success
+
+
+def test_many_clients_at_once_are_all_answered_in_time(start_node):
+    """None waits longer than the budget, though together they ask for many times as much."""
+    budget, clients = 0.3, 6
+    peer = start_node("/crowded", compute_budget=str(budget))
+    assert call(peer).success
+    requests = [request_for(ENDLESS) for _ in range(clients)]
+    requests[3].joints.position[0] = math.nan
+    began, ends, answers = time.monotonic(), {}, {}
+    ask = peer.ros.create_client(SolveEquilibrium, "ctr_equilibrium/solve")
+    peer.wait(ask.service_is_ready, "service")
+
+    def keep(number, future):
+        ends[number], answers[number] = time.monotonic() - began, future.result()
+
+    for number, request in enumerate(requests):
+        ask.call_async(request).add_done_callback(partial(keep, number))
+    peer.wait(lambda: len(answers) == clients, "answers")
+    assert [answers[number].status for number in range(clients)].count("timeout") == clients - 1
+    assert answers[3].status == "bad_input"
+    assert ends.pop(3) < budget
+    assert max(ends.values()) < budget + GRACE
+
+
+def test_the_service_ends_with_a_node_that_is_killed(start_node):
+    peer = start_node("/killed")
+    number = peer.process.id
+    child = int(Path(f"/proc/{number}/task/{number}/children").read_text(encoding="ascii").split()[0])
+    os.kill(number, signal.SIGKILL)
+    peer.process.wait(5.0)
+    deadline = time.monotonic() + 5.0
+    while Path(f"/proc/{child}").exists():
+        assert time.monotonic() < deadline, "the service has outlived its node"
+        time.sleep(0.02)

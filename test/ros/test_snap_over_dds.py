@@ -38,6 +38,9 @@ def test_a_followed_snap_is_published_and_told(before_the_fold):
     status, values = peer.diagnostics(lambda values: values["last status"] == "snap")
     assert status.level == DiagnosticStatus.WARN and "snap" in status.message
     assert values["snaps"] == "1" and "4.91991" in values["last message"]
+    before, after = values["last snap, tip before -> after [m]"].split(" -> ")
+    tip = reply.tip.pose.position
+    assert after == f"({tip.x:.6f}, {tip.y:.6f}, {tip.z:.6f})" != before
     again = peer.client.command(full_overlap(286), TIMEOUT)
     assert again.stability_margin > 0.9
     _, values = peer.diagnostics(lambda values: values["last status"] == "ok")

@@ -1,0 +1,70 @@
+"""What should not happen: code that fails in a way nobody has thought of does not end the node."""
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
+
+from ctr_pvs import load_robot
+from ctr_pvs_interfaces.srv import SolveEquilibrium
+from ctr_pvs_ros.commands import CommandReader
+from ctr_pvs_ros.node import EquilibriumNode
+from ctr_pvs_ros.process import share_file
+from ctr_pvs_ros.service import SolveService
+
+ROBOT = str(share_file("config", "renda2021.yaml"))
+JOINTS = ["outer_rotation", "outer_translation", "inner_rotation", "inner_translation"]
+GOOD = JointState(name=JOINTS, position=[0.0, 0.0935, 0.5, 0.2085])
+
+
+class BrokenSolver:
+    """Fails as code with a mistake in it does."""
+
+    def solve(self, *arguments, **options):
+        raise ZeroDivisionError("a mistake")
+
+
+@pytest.fixture
+def node(graph):
+    """A node in this process, so that its parts can be broken."""
+    node = EquilibriumNode(namespace="/faulty", parameter_overrides=[Parameter("robot_file", value=ROBOT)])
+    yield node
+    node.destroy_node()
+
+
+def command(node):
+    """Hand it a command as an executor does."""
+    (subscription,) = (each for each in node.subscriptions if each.topic_name == "/faulty/servo_jp")
+    subscription.callback(GOOD)
+    status = node._report.status("node", "robot", 0.0)
+    return status, {value.key: value.value for value in status.values}
+
+
+def test_a_broken_solve_is_told_and_the_stream_goes_on(node, monkeypatch):
+    with monkeypatch.context() as broken:
+        broken.setattr(node._stream, "_solver", BrokenSolver())
+        status, values = command(node)
+    assert status.level == DiagnosticStatus.ERROR
+    assert "ZeroDivisionError: a mistake" in status.message
+    assert values["internal errors"] == "1"
+    status, values = command(node)
+    assert status.level == DiagnosticStatus.OK
+    assert values["answers published"] == "1"
+
+
+def test_an_answer_that_cannot_be_sent_is_told_and_the_stream_goes_on(node, monkeypatch):
+    with monkeypatch.context() as broken:
+        broken.setattr(node._outputs, "publish", BrokenSolver().solve)
+        status, values = command(node)
+    assert status.level == DiagnosticStatus.ERROR
+    assert values["answers published"] == "0"
+    assert command(node)[0].level == DiagnosticStatus.OK
+
+
+def test_the_service_answers_when_its_solver_is_broken(graph):
+    service = SolveService(CommandReader(load_robot(ROBOT)), BrokenSolver())
+    response = service.answer(SolveEquilibrium.Request(joints=GOOD), SolveEquilibrium.Response(), Header(), 60, 1.0)
+    assert not response.success
+    assert response.status == "not_converged"
+    assert "a mistake" in response.message
