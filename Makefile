@@ -25,7 +25,7 @@ lint: setup ## style, format and types
 test: lint ## lint, solver tests and node tests
 	@$(IN_ENV) python3 -m pytest
 
-soak: setup ## the long tests
+soak: setup ## the long tests; SOAK_MINUTES=1 shortens the longest of them, 10 minutes of load
 	@$(IN_ENV) python3 -m pytest -m soak
 
 bench: setup ## speed against accuracy, measured here and charted: docs/speed_accuracy.*, docs/cost_growth.*

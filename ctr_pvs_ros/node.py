@@ -75,7 +75,8 @@ class EquilibriumNode(Node):
         options: of rclpy's Node.
 
     Attributes:
-        interrupted: whether a signal has ended one of its callbacks; who spins it should stop.
+        interrupted: whether a signal asks it to end; who spins it should stop.
+        solving: whether a solve of the stream is under way.
 
     Raises:
         ParameterException, RuntimeError, ValueError: its parameters, its middleware or its robot file do not allow it;
@@ -84,7 +85,7 @@ class EquilibriumNode(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(NODE_NAME, **options)
-        self.interrupted = False
+        self.interrupted = self.solving = False
         parameters.declare(self)
         self._settings = parameters.read(self)
         self._robot = load_robot(self._settings.robot_file)
@@ -199,7 +200,11 @@ class EquilibriumNode(Node):
     def _solve(self, command: Command, stamp: Time) -> None:
         settings = self._settings
         policy = Policy(settings.on_snap, settings.margin_warn, settings.margin_stop)
-        answer = self._stream.follow(command, policy, settings.compute_budget)
+        self.solving = True
+        try:
+            answer = self._stream.follow(command, policy, settings.compute_budget)
+        finally:
+            self.solving = False
         if answer.verdict.publish:
             stamped = stamp_bytes(stamp.sec, stamp.nanosec)
             self._outputs.publish(Sent(answer.equilibrium, stamped, settings.backbone_poses))
@@ -239,10 +244,17 @@ class EquilibriumNode(Node):
 
 def main(args: list[str] | None = None) -> int:
     """Entry point of the executable equilibrium_node; returns its exit code."""
-    # Python's own handler instead of rclpy's, so that either signal also ends a solve that is under way.
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, signal.default_int_handler)
     node = None
+
+    def end(number: int, frame: object) -> None:
+        """Instead of rclpy's handler: either signal also ends a solve that is under way. Elsewhere the executor would
+        log an exception, so there the node ends as soon as the executor comes round."""
+        if node is None or node.solving:
+            raise KeyboardInterrupt
+        node.interrupted = True
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, end)
     try:
         try:
             rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)

@@ -37,7 +37,7 @@ from ctr_pvs_ros.service import SolveService
 
 CLIENTS = 16  # requests that are waited for at the same time; more wait in the middleware
 SWITCH_INTERVAL = 5e-5  # s; a thread that has an answer to send waits no longer for the one that solves
-STOP_TIMEOUT = 1.0  # s; after it the process is killed
+STOP_TIMEOUT = 0.8  # s; after it the process is killed and cannot tidy up its shared memory
 
 
 class ServiceProcess:
