@@ -94,6 +94,7 @@ def test_markers_over_dds(start_node):
     peer.wait(lambda: bool(arrays), "the tubes for a late joiner")
     assert arrays[0].markers[0].header.stamp == reply.tip.header.stamp
     tips = peer.subscribe(PoseStamped, "setpoint_cp")
+    peer.wait(lambda: bool(tips), "the tip for a late joiner")
     peer.client.command({**GOOD, "outer_translation": 0.1858, "inner_translation": 0.2085}, TIMEOUT)
     peer.wait(lambda: len(arrays) > 1 and len(tips) > 1, "the tubes after a command")
     assert [marker.action for marker in arrays[-1].markers] == [Marker.DELETE, Marker.ADD]
