@@ -249,9 +249,12 @@ def main(args: list[str] | None = None) -> int:
     def end(number: int, frame: object) -> None:
         """Instead of rclpy's handler: either signal also ends a solve that is under way. Elsewhere the executor would
         log an exception, so there the node ends as soon as the executor comes round."""
-        if node is None or node.solving:
+        if node is None:
             raise KeyboardInterrupt
         node.interrupted = True
+        if node.solving:
+            node.solving = False  # once is enough: a second signal must not break into the end of the first
+            raise KeyboardInterrupt
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, end)

@@ -19,6 +19,7 @@ from typing import Any
 
 import rclpy
 from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.executors import ExternalShutdownException
 from rclpy.executors import MultiThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -37,6 +38,7 @@ from ctr_pvs_ros.service import SolveService
 
 CLIENTS = 16  # requests that are waited for at the same time; more wait in the middleware
 SWITCH_INTERVAL = 5e-5  # s; a thread that has an answer to send waits no longer for the one that solves
+TIDY_TIME = 0.5  # s; to take leave of the middleware
 STOP_TIMEOUT = 0.8  # s; after it the process is killed and cannot tidy up its shared memory
 
 
@@ -147,10 +149,11 @@ def _settings_from(line: bytes) -> Settings:
 
 
 def _listen(pipe: IO[bytes], node: SolveNode) -> None:
-    """Take over settings until the node's end of the pipe closes; then end at once, even in mid-solve."""
+    """Take over settings until the node's end of the pipe closes; then end, even in mid-solve."""
     for line in pipe:
         node.update(_settings_from(line))
-    os._exit(0)
+    threading.Timer(TIDY_TIME, os._exit, (0,)).start()
+    rclpy.try_shutdown()
 
 
 def main() -> None:
@@ -165,7 +168,11 @@ def main() -> None:
     threading.Thread(target=_listen, args=(pipe, node), daemon=True).start()
     executor = MultiThreadedExecutor(CLIENTS)
     executor.add_node(node)
-    executor.spin()
+    with suppress(ExternalShutdownException):
+        executor.spin()
+    # Without this the middleware would leave its shared memory behind. A solve that is under way is not waited for.
+    node.destroy_node()
+    os._exit(0)
 
 
 if __name__ == "__main__":
