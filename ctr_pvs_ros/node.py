@@ -253,7 +253,6 @@ def main(args: list[str] | None = None) -> int:
             raise KeyboardInterrupt
         node.interrupted = True
         if node.solving:
-            node.solving = False  # once is enough: a second signal must not break into the end of the first
             raise KeyboardInterrupt
 
     for number in (signal.SIGINT, signal.SIGTERM):

@@ -19,7 +19,6 @@ from typing import Any
 
 import rclpy
 from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.executors import ExternalShutdownException
 from rclpy.executors import MultiThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -148,10 +147,11 @@ def _settings_from(line: bytes) -> Settings:
     return Settings(**values)
 
 
-def _listen(pipe: IO[bytes], node: SolveNode) -> None:
+def _listen(pipe: IO[bytes], node: SolveNode, ended: threading.Event) -> None:
     """Take over settings until the node's end of the pipe closes; then end, even in mid-solve."""
     for line in pipe:
         node.update(_settings_from(line))
+    ended.set()
     threading.Timer(TIDY_TIME, os._exit, (0,)).start()
     rclpy.try_shutdown()
 
@@ -165,11 +165,15 @@ def main() -> None:
     sys.setswitchinterval(SWITCH_INTERVAL)
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     node = SolveNode(json.loads(names), _settings_from(settings))
-    threading.Thread(target=_listen, args=(pipe, node), daemon=True).start()
+    ended = threading.Event()
+    threading.Thread(target=_listen, args=(pipe, node, ended), daemon=True).start()
     executor = MultiThreadedExecutor(CLIENTS)
     executor.add_node(node)
-    with suppress(ExternalShutdownException):
+    try:
         executor.spin()
+    except Exception:  # the end takes the middleware away under the executor
+        if not ended.is_set():
+            raise
     # Without this the middleware would leave its shared memory behind. A solve that is under way is not waited for.
     node.destroy_node()
     os._exit(0)
