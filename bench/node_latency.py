@@ -60,6 +60,8 @@ class Measured:
         self._times = {part: np.array(times) for part, times in content["times"].items()}
 
     def told(self, percent: float) -> str:
+        if len(self._times["in all"]) <= WARMING:
+            return "too few"
         time = float(np.percentile(self._times["in all"][WARMING:], percent))
         return f"{1e6 * time:.0f} µs, {time / self._u:.0f} u"
 

@@ -165,10 +165,11 @@ def main() -> None:
     sys.setswitchinterval(SWITCH_INTERVAL)
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     node = SolveNode(json.loads(names), _settings_from(settings))
-    ended = threading.Event()
-    threading.Thread(target=_listen, args=(pipe, node, ended), daemon=True).start()
+    # Everything is there before the pipe is listened to: half an executor complains when it is thrown away.
     executor = MultiThreadedExecutor(CLIENTS)
     executor.add_node(node)
+    ended = threading.Event()
+    threading.Thread(target=_listen, args=(pipe, node, ended), daemon=True).start()
     try:
         executor.spin()
     except Exception:  # the end takes the middleware away under the executor
