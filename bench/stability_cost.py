@@ -25,11 +25,12 @@ from numpy.typing import NDArray
 
 from ctr_pvs import EquilibriumSolver
 from ctr_pvs import load_robot
+from ctr_pvs.continuation import DEGREES
 from ctr_pvs.continuation import CommandPath
 from ctr_pvs.continuation import State
 from ctr_pvs.continuation import follow
+from ctr_pvs.convexity import convex_between
 from ctr_pvs.models import Models
-from ctr_pvs.refine import DEGREES
 from ctr_pvs.relaxed import relaxed_state
 from ctr_pvs.snap import land
 from ctr_pvs.solve import newton
@@ -93,14 +94,14 @@ def tasks(alpha: Array) -> dict[str, Task]:
     energy = models.energy(D, degree)
     q = newton(energy, alpha, energy.space.coordinates(state.torques)).q
     rotation, slide = (CommandPath(alpha, D, *end) for end in ((alpha + STEP, D), (alpha, D_NEAR)))
-    form, psi, other = models.pair_form(energy), energy.angles(q, alpha), energy.angles(q, alpha + STEP)
+    pairs, psi, other = models.pairs(energy), energy.angles(q, alpha), energy.angles(q, alpha + STEP)
     return {
         "warm answer, 0.1° further": answers(alpha, False),
         "warm answer, 0.1 mm further": answers(alpha, True),
         "plain Newton, 0.1° further": lambda: newton(energy, alpha + STEP, q),
         "following the path, 0.1° further": lambda: follow(models, rotation, state, degree, np.inf),
         "following the path, 0.1 mm further": lambda: follow(models, slide, state, degree, np.inf),
-        "of it the certificate, once": lambda: form.convex_between(psi, other),
+        "of it the certificate, once": lambda: convex_between(pairs, psi, other),
         "margin": lambda: stability_margin(energy, q, alpha),
         "margin with recheck": lambda: rechecked_margin(energy, q, alpha),
         "reserve, the first at a D": lambda: snap_reserve(energy, q, alpha, relaxed_gain(energy)),

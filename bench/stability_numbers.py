@@ -25,11 +25,11 @@ from scipy.optimize import minimize
 
 from ctr_pvs import EquilibriumSolver
 from ctr_pvs import load_robot
+from ctr_pvs.continuation import DEGREES
 from ctr_pvs.continuation import State
 from ctr_pvs.equilibria import equilibria
 from ctr_pvs.equilibria import folds
 from ctr_pvs.models import Models
-from ctr_pvs.refine import DEGREES
 from ctr_pvs.shape import Shape
 from ctr_pvs.shape import TorsionShape
 from ctr_pvs.solve import newton

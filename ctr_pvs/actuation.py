@@ -20,6 +20,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +31,7 @@ from ctr_pvs.energy import bending_density
 from ctr_pvs.energy import shared_curvature
 from ctr_pvs.robot import Segment
 from ctr_pvs.sections import ABSENT
+from ctr_pvs.sections import Domain
 from ctr_pvs.sections import Event
 from ctr_pvs.shape import Shape
 
@@ -55,7 +58,7 @@ class Loads:
 def virtual_work_loads(shape: Shape, nodes: Sequence[SectionNodes]) -> Loads:
     """The loads of an equilibrium ``shape``, exact derivatives of the energy that is sampled at ``nodes``."""
     rates = _SectionRates(shape, nodes)
-    minus, plus = (rates.slide.sum(axis=0) + _boundary_forces(shape, rates, side) for side in (-1, 1))
+    minus, plus = (rates.slide.sum(axis=0) + boundary_forces(shape.domain, rates, side) for side in (-1, 1))
     kink = shape.domain.kinked_tubes()
     minus[~kink] = plus[~kink]
     return Loads(-rates.torque[0], plus, np.column_stack([minus, plus]), kink)
@@ -116,79 +119,95 @@ class _SectionRates:
         turned_beyond = (shape.angle_at_boundaries[m + 1] - shape.angle_at_boundaries[m]) / shape.domain.lengths[m]
         return rate + float(np.sum(pull * turned)) - float(turned_beyond @ self.torque[m + 1])
 
+    def thin(self, index: int, segments: NDArray[np.int64]) -> float:
+        robot, domain = self.shape.materials.robot, self.shape.domain
+        psi = self.shape.angle_at_boundaries[index]
+        bending, kappa = np.zeros(len(psi)), np.zeros(len(psi), dtype=complex)
+        twisting = 0.0
+        for tube in np.flatnonzero(segments != ABSENT):
+            segment = robot.tubes[tube].segments[segments[tube]]
+            start = robot.tubes[tube].breaks[segments[tube]]
+            bending[tube] = segment.bending_stiffness
+            kappa[tube] = segment.pre_curvature(np.array(domain.boundaries[index] + domain.D[tube] - start))
+            twisting += self._twisting(float(self.torque[index, tube]), segment)
+        if not bending.any():
+            return 0.0
+        k = shared_curvature(bending, bending * kappa * np.exp(1j * psi))
+        return float(bending_density(bending, kappa, psi, k)) - twisting
 
-def _boundary_forces(shape: Shape, rates: _SectionRates, side: int) -> Array:
-    """(N,) part of dE/dD_j towards ``side`` (+1, -1) from the section ends that ride on tube j, and from the guide."""
-    force = np.array([_guide_force(shape, rates, tube, side) for tube in range(len(shape.alpha))])
-    for index, events in enumerate(shape.domain.events):
+    def guide(self, tube: int, segment: int) -> float:
+        material = self.shape.materials.robot.tubes[tube]
+        guided = material.segments[segment]
+        kappa = guided.pre_curvature(np.array(self.shape.domain.D[tube] - material.breaks[segment]))
+        straightening = 0.5 * guided.bending_stiffness * float(np.abs(kappa)) ** 2
+        return straightening - self._twisting(float(self.torque[0, tube]), guided)
+
+    def _twisting(self, torque: float, segment: Segment) -> float:
+        """Work per length [N] that a constant torque does in twisting a segment beyond its stored energy."""
+        return 0.5 * torque**2 / segment.torsional_stiffness if self.shape.twists else 0.0
+
+
+class Rates(Protocol):
+    """Energy per motion of section ends [N], as numbers or as rows of coefficients (C,) that give numbers later.
+
+    right, left : (M, ...) per motion of a section's far and near end.
+    """
+
+    right: Array
+    left: Array
+
+    def thin(self, index: int, segments: NDArray[np.int64]) -> Any:
+        """Energy per length of a vanishing section at boundary ``index`` with one of ``segments`` (N,) per tube:
+        bending density less the work T^2 / (2 GJ) that the passing torques do in twisting it."""
+
+    def guide(self, tube: int, segment: int) -> Any:
+        """Energy per dD_j of guiding more of a tube's ``segment``: straightening it, less the work of its torque in
+        twisting it."""
+
+
+def boundary_forces(domain: Domain, rates: Rates, side: int) -> Array:
+    """(N, ...) part of dE/dD_j towards ``side`` (+1, -1) from the section ends that ride on tube j, and the guide."""
+    force = np.zeros((len(domain.D), *rates.right.shape[1:]))
+    for tube in range(len(domain.D)):
+        segment = _guided_segment(domain, tube, side)
+        if segment != ABSENT:  # its tip is on the orifice: nothing is left to go in
+            force[tube] = rates.guide(tube, segment)
+    for index, events in enumerate(domain.events):
         for event in events:
             if index == 0 and side < 0:
-                force[event.tube] -= _opening(shape, rates, 0, event, side)
+                force[event.tube] -= _opening(domain, rates, 0, event, side)
             elif index > 0 and len(events) > 1:
-                force[event.tube] -= _opening(shape, rates, index, event, side)
+                force[event.tube] -= _opening(domain, rates, index, event, side)
             elif index > 0:
                 force[event.tube] -= rates.right[index - 1] + _left_rate(rates, index)
     return force
 
 
-def _left_rate(rates: _SectionRates, index: int) -> float:
+def _guided_segment(domain: Domain, tube: int, side: int) -> int:
+    """The segment that goes into the guide with dD_j towards ``side``; ``ABSENT`` where none is left."""
+    on_orifice = [event.after for event in domain.events[0] if event.tube == tube]
+    if side > 0 and on_orifice:
+        return on_orifice[0]
+    index = int(domain.guide_segment[tube])
+    return 0 if index == ABSENT else index  # with its base on the orifice the first segment goes in
+
+
+def _left_rate(rates: Rates, index: int) -> Any:
     """Energy per motion of boundary ``index`` as the near end of the section after it; past the last there is none."""
-    return float(rates.left[index]) if index < len(rates.left) else 0.0
+    return rates.left[index] if index < len(rates.left) else 0.0
 
 
-def _opening(shape: Shape, rates: _SectionRates, index: int, event: Event, side: int) -> float:
+def _opening(domain: Domain, rates: Rates, index: int, event: Event, side: int) -> Any:
     """Energy per motion of ``event`` along s when it parts from what else is on boundary ``index``.
 
     Towards +D the event moves back and shortens the section before; towards -D it moves on and shortens the one
     after.  The thin section between holds the materials of the other side, but for the event's own tube.
     """
-    domain = shape.domain
     if side > 0:
         segments = domain.segment[index - 1].copy()
         segments[event.tube] = event.after
-        return float(rates.right[index - 1]) - _thin_section(shape, rates, index, segments)
-    beyond = np.full(len(shape.alpha), ABSENT)
+        return rates.right[index - 1] - rates.thin(index, segments)
+    beyond = np.full(len(domain.D), ABSENT)
     segments = (domain.segment[index] if index < domain.n_sections else beyond).copy()
     segments[event.tube] = event.before
-    return _left_rate(rates, index) + _thin_section(shape, rates, index, segments)
-
-
-def _thin_section(shape: Shape, rates: _SectionRates, index: int, segments: NDArray[np.int64]) -> float:
-    """Energy per length [N] of a vanishing section at boundary ``index`` with one segment per tube: bending density
-    less the work T^2 / (2 GJ) that the passing torques do in twisting it."""
-    robot, domain = shape.materials.robot, shape.domain
-    psi = shape.angle_at_boundaries[index]
-    bending, kappa = np.zeros(len(psi)), np.zeros(len(psi), dtype=complex)
-    twisting = 0.0
-    for tube in np.flatnonzero(segments != ABSENT):
-        segment = robot.tubes[tube].segments[segments[tube]]
-        start = robot.tubes[tube].breaks[segments[tube]]
-        bending[tube] = segment.bending_stiffness
-        kappa[tube] = segment.pre_curvature(np.array(domain.boundaries[index] + domain.D[tube] - start))
-        twisting += _twisting(shape, float(rates.torque[index, tube]), segment)
-    if not bending.any():
-        return 0.0
-    k = shared_curvature(bending, bending * kappa * np.exp(1j * psi))
-    return float(bending_density(bending, kappa, psi, k)) - twisting
-
-
-def _guide_force(shape: Shape, rates: _SectionRates, tube: int, side: int) -> float:
-    """Energy per dD_j of guiding more of tube j: straightening it, less the work of its torque in twisting it."""
-    material, base = shape.materials.robot.tubes[tube], shape.domain.D[tube]
-    index = int(shape.domain.guide_segment[tube])
-    on_orifice = [event.after for event in shape.domain.events[0] if event.tube == tube]
-    if side > 0 and on_orifice:
-        index = on_orifice[0]
-    elif index == ABSENT:  # its base is on the orifice: the first segment goes in
-        index = 0
-    if index == ABSENT:  # its tip is on the orifice: nothing is left to go in
-        return 0.0
-    segment = material.segments[index]
-    kappa = segment.pre_curvature(np.array(base - material.breaks[index]))
-    straightening = 0.5 * segment.bending_stiffness * float(np.abs(kappa)) ** 2
-    return straightening - _twisting(shape, float(rates.torque[0, tube]), segment)
-
-
-def _twisting(shape: Shape, torque: float, segment: Segment) -> float:
-    """Work per length [N] that a constant torque does in twisting a segment beyond its stored energy."""
-    return 0.5 * torque**2 / segment.torsional_stiffness if shape.twists else 0.0
+    return _left_rate(rates, index) + rates.thin(index, segments)

@@ -21,10 +21,10 @@ from ctr_pvs.batch_walk import Problem
 from ctr_pvs.batch_walk import check
 from ctr_pvs.batch_walk import converge
 from ctr_pvs.batch_walk import follow
+from ctr_pvs.convexity import REACH
 from ctr_pvs.fidelity import RAISES
 from ctr_pvs.fidelity import raised_degrees
 from ctr_pvs.refine import INTEGRATION_SHARE
-from ctr_pvs.serving import WIDER
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -149,7 +149,7 @@ class Group:
             here = problem.take(rows)
             none = np.zeros((problem.tables.n, len(rows)))
             moved = np.abs(here.angles(none, here.alpha) - found.theta[:, rows]).max(axis=0, initial=0.0)
-            reach = here.values.slack + WIDER * moved
+            reach = here.values.slack + REACH * moved
             count = np.zeros(len(rows), dtype=np.int64)
             certain = check(here, none, np.ones(len(rows), dtype=bool), count, reach, settled=False)
             enough = certain.good & (certain.bound <= self.goal)

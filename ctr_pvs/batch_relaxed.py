@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from ctr_pvs.batch_layout import Layout
 from ctr_pvs.batch_tables import Tables
+from ctr_pvs.continuation import DEGREES
 from ctr_pvs.energy import TorsionEnergy
 from ctr_pvs.materials import Materials
-from ctr_pvs.refine import DEGREES
 from ctr_pvs.relaxed import SAME_ANGLE
 from ctr_pvs.relaxed import Relaxed
 from ctr_pvs.relaxed import relaxed_state

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError
 
+from ctr_pvs.convexity import convex_between
 from ctr_pvs.energy import TorsionEnergy
 from ctr_pvs.models import Models
 from ctr_pvs.sensitivity import Sensitivity
@@ -26,6 +27,8 @@ from ctr_pvs.twist import TorqueField
 
 Array = NDArray[np.float64]
 
+#: Polynomial degrees of the twist rates at which paths are followed, tried in turn.
+DEGREES = (5, 7, 9, 12, 16, 21, 28)
 #: A step along the path shorter than this fraction of it is none: the branch ends here.
 SHORTEST_STEP = 1e-13
 #: A state with less margin that cannot be left by a step is at the branch's end: at a fold the margin falls with the
@@ -143,7 +146,7 @@ def _convex_between(models: Models, state: State, other: State, D: Array, degree
     """True if the energy at ``D`` is certainly convex around the twist angles of both states."""
     energy = models.energy(D, degree)
     angles = [_angles(models, which, energy) for which in (state, other)]
-    return models.pair_form(energy).convex_between(*angles)
+    return convex_between(models.pairs(energy), *angles)
 
 
 def _angles(models: Models, state: State, energy: TorsionEnergy) -> Array:

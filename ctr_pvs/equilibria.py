@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from numpy.typing import NDArray
 
+from ctr_pvs.continuation import DEGREES
 from ctr_pvs.energy import TorsionEnergy
 from ctr_pvs.equilibrium import Equilibrium
 from ctr_pvs.errors import FieldError
 from ctr_pvs.models import Models
 from ctr_pvs.multistart import search
-from ctr_pvs.refine import DEGREES
 from ctr_pvs.refine import INTEGRATION_SHARE
 from ctr_pvs.refine import LOOSER
 from ctr_pvs.refine import tip_position

@@ -40,7 +40,8 @@ class Equilibrium:
     status, message : the outcome, in one word and in one line; ``success`` is true for "ok" and "snap".
     fidelity : model level; degrees_of_freedom : number of unknowns solved for.
     known_estimate : of the tip error, where it was needed to solve; see ``error_estimate``.
-    residual : bound of the twist [rad] that the unbalanced torque left after the solve would cause; NaN likewise.
+    residual : bound of the twist [rad] that the unbalanced torque left after the solve would cause; NaN without an
+        equilibrium.
     iterations : Newton iterations spent on the way from the start to this answer.
     snaps : the snaps on the way, each with its place on the path, the states before and after, and the energy released.
 

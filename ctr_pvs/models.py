@@ -8,9 +8,9 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from ctr_pvs.convexity import PairForm
 from ctr_pvs.energy import TorsionEnergy
 from ctr_pvs.materials import Materials
+from ctr_pvs.pair_form import Pairs
 from ctr_pvs.robot import Robot
 from ctr_pvs.sections import piecewise_domain
 from ctr_pvs.twist import Degrees
@@ -25,7 +25,7 @@ class Models:
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
         self._kept: OrderedDict[tuple[bytes, Degrees], TorsionEnergy] = OrderedDict()
-        self._pairs: WeakKeyDictionary[TorsionEnergy, PairForm] = WeakKeyDictionary()
+        self._pairs: WeakKeyDictionary[TorsionEnergy, Pairs] = WeakKeyDictionary()
 
     def energy(self, D: NDArray[np.float64], degree: Degrees) -> TorsionEnergy:
         """The energy at ``D`` (N,) [m] with twist rates of polynomial ``degree`` in coupled sections."""
@@ -39,8 +39,8 @@ class Models:
             self._kept.popitem(last=False)
         return energy
 
-    def pair_form(self, energy: TorsionEnergy) -> PairForm:
+    def pairs(self, energy: TorsionEnergy) -> Pairs:
         """The pairwise coupling of ``energy``, made once."""
         if energy not in self._pairs:
-            self._pairs[energy] = PairForm(energy)
+            self._pairs[energy] = Pairs(energy)
         return self._pairs[energy]

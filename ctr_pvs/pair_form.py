@@ -25,23 +25,28 @@ class Pairs:
     """Every two tubes that pull each other at a Gauss point of ``energy``: R rows.
 
     amplitude, phase (R,) [J], [rad]; turns (R, N) = d theta / d alpha; map (R, n) = d theta / dq, with the columns of q
-    in the given ``order``.  tubes : the two tubes of each pair; pair (R,) : which of them a row is about.
+    in the given ``order``, else in that of ``energy``.
+    tubes : the two tubes of each pair; pair, node (R,) : which of them a row is about, and which Gauss point.
     """
 
-    def __init__(self, energy: TorsionEnergy, order: NDArray[np.int64]) -> None:
+    def __init__(self, energy: TorsionEnergy, order: NDArray[np.int64] | slice = slice(None)) -> None:
         first, second = np.triu_indices(energy.materials.robot.n_tubes, 1)
         product = energy.moment[:, first].conj() * energy.moment[:, second]
         node, pair = np.nonzero(product)
         product = product[node, pair]
         self.tubes, self.pair = list(zip(first.tolist(), second.tolist(), strict=True)), pair
-        first, second = first[pair], second[pair]
+        self.first, self.second, self.node = first[pair], second[pair], node
         self.amplitude = energy.coupling[node] * np.abs(product)
         self.phase = np.angle(product)
-        self.map = (energy.angle_map[node, second] - energy.angle_map[node, first])[:, order]
+        self.map = (energy.angle_map[node, self.second] - energy.angle_map[node, self.first])[:, order]
         self.turns = np.zeros((len(node), energy.materials.robot.n_tubes))
         row = np.arange(len(node))
-        self.turns[row, first] = -1.0
-        self.turns[row, second] = 1.0
+        self.turns[row, self.first] = -1.0
+        self.turns[row, self.second] = 1.0
+
+    def angles(self, psi: Array) -> Array:
+        """theta (R,) [rad] between the turned pre-curvatures, from psi (G, N) at the Gauss points."""
+        return self.phase + psi[self.node, self.second] - psi[self.node, self.first]
 
     def waves(self, n: int) -> Array:
         """(2 R + 2, n + N + 1): maps (q, alpha, 1) to the angles whose sines are cos(theta), sin(theta), 1 and 0."""
@@ -59,7 +64,7 @@ class Pairs:
 class PackedForm:
     """Hessian and gradient of the first ``n`` unknowns from the sines of ``Pairs.waves``.
 
-    answers : how many right-hand sides follow the gradient: d(gradient)/d alpha of every tube, or none.
+    tangents : whether d(gradient) / d alpha of every tube follows the gradient.
     """
 
     def __init__(self, pairs: Pairs, n: int, tangents: bool) -> None:

@@ -15,19 +15,19 @@ from numpy.typing import NDArray
 from scipy.linalg.blas import daxpy
 from scipy.linalg.blas import idamax
 
+from ctr_pvs.continuation import DEGREES
 from ctr_pvs.continuation import LARGEST_SLIDE
 from ctr_pvs.continuation import State
+from ctr_pvs.convexity import REACH
 from ctr_pvs.energy import TorsionEnergy
 from ctr_pvs.fidelity import RAISES
 from ctr_pvs.fidelity import first_degrees
 from ctr_pvs.fidelity import raised_degrees
 from ctr_pvs.materials import Materials
-from ctr_pvs.refine import DEGREES
 from ctr_pvs.relaxed import Relaxed
 from ctr_pvs.relaxed import relaxed_state
 from ctr_pvs.robot import Robot
 from ctr_pvs.sections import piecewise_domain
-from ctr_pvs.serving import WIDER
 from ctr_pvs.serving import Served
 from ctr_pvs.serving import ServingModel
 from ctr_pvs.serving import raised
@@ -53,10 +53,6 @@ class Rungs:
         length = max(self.materials.domain.length, tolerance)
         self.slack = min(max(LEAST_SLACK, SLACK * tolerance / length), MOST_SLACK)
         self._models: list[ServingModel] = []
-
-    @property
-    def lowest(self) -> ServingModel:
-        return self._models[0] if self._models else self[0]
 
     @cached_property
     def relaxed(self) -> Relaxed | None:
@@ -144,14 +140,13 @@ class Server:
     def advance(self, last: Position, alpha: Array, D: Array) -> Position | None:
         """The equilibrium at (alpha, D) on the branch of ``last``; None if one step cannot be proven to lead there."""
         rungs = self.rungs(D)
-        lowest = rungs.lowest
-        moved = lowest is not last.trail[0].model
+        moved = rungs[0] is not last.trail[0].model
         if moved and not self._near(rungs, last, D):
             return None
-        if self.untwisted and lowest.may_be_untwisted(alpha, self.goal):
-            flat = lowest.untwisted(alpha, _converted(lowest, last.served, last.alpha)[1], rungs.slack)
-            if flat is not None and flat.bound <= self.goal:
-                return Position(alpha, D, [flat], False)
+        if self._may_be_untwisted(rungs, alpha):
+            flat = self._untwisted(rungs, alpha, last.state)
+            if flat is not None:
+                return flat
         trail: list[Served] = []
         while not trail or (trail[-1].bound > self.goal and len(trail) < len(RAISES)):
             model = rungs[len(trail)]
@@ -165,15 +160,14 @@ class Server:
     def settle(self, state: State) -> Position | None:
         """``state``, of any degree, at the degrees of this server; None if no model has a stable equilibrium there."""
         rungs = self.rungs(state.D)
-        if self.untwisted and rungs[0].may_be_untwisted(state.alpha, self.goal):
-            z = rungs[0].start(rungs[0].energy.space.coordinates(state.torques), state.alpha)
-            flat = rungs[0].untwisted(state.alpha, rungs[0].waves.dot(z), rungs.slack)
-            if flat is not None and flat.bound <= self.goal:
-                return Position(state.alpha, state.D, [flat], False)
+        if self._may_be_untwisted(rungs, state.alpha):
+            flat = self._untwisted(rungs, state.alpha, state)
+            if flat is not None:
+                return flat
         trail: list[Served] = []
         for index in range(len(RAISES)):
             model = rungs[index]
-            guess = model.start(model.energy.space.coordinates(state.torques), state.alpha)
+            guess = _converted(model, state)[0]
             served = model.solve(guess.copy(), None, rungs.slack) or model.solve(guess, None, AT_A_FOLD)
             if served is None:
                 continue  # so near a fold that this degree does not have the branch
@@ -187,6 +181,16 @@ class Server:
         rungs = self.rungs(D)
         flat = rungs[0].untwisted(alpha, None, LEAST_SLACK)
         return None if flat is None else Position(alpha, D, [flat], False)
+
+    def _may_be_untwisted(self, rungs: Rungs, alpha: Array) -> bool:
+        return self.untwisted and rungs[0].may_be_untwisted(alpha, self.goal)
+
+    def _untwisted(self, rungs: Rungs, alpha: Array, last: State) -> Position | None:
+        """The untwisted state, if it is near enough and on the branch of ``last``."""
+        flat = rungs[0].untwisted(alpha, _converted(rungs[0], last)[1], rungs.slack)
+        if flat is None or flat.bound > self.goal:
+            return None
+        return Position(alpha, rungs.materials.domain.D, [flat], False)
 
     def _near(self, rungs: Rungs, last: Position, D: Array) -> bool:
         """True if a step from ``last`` to ``D`` changes no overlap and is short."""
@@ -203,19 +207,20 @@ def _guess(model: ServingModel, trail: list[Served], last: Position, alpha: Arra
             daxpy((alpha - last.alpha).dot(known.answers), z, model.n, -1.0)
             z[model.n : -1] = alpha
             return z, known.angles
-    z, before = _converted(model, trail[-1], alpha) if trail else _converted(model, last.served, last.alpha)
+    z, before = _converted(
+        model, Position(alpha, model.energy.materials.domain.D, trail).state if trail else last.state
+    )
     z[model.n : -1] = alpha
     return z, before
 
 
-def _converted(model: ServingModel, served: Served, alpha: Array) -> tuple[Array, Array]:
-    """z and angles of ``model`` for the torques of ``served`` under its own ``alpha``."""
-    field = served.model.energy.space.field(served.q)
-    z = model.start(model.energy.space.coordinates(field), alpha)
+def _converted(model: ServingModel, state: State) -> tuple[Array, Array]:
+    """z and angles of ``model`` for the torques of ``state`` under its own base angles."""
+    z = model.start(model.energy.space.coordinates(state.torques), state.alpha)
     return z, model.waves.dot(z)
 
 
 def _convex_behind(last: Served, served: Served, before: Array) -> bool:
     """True if the energy at the D of ``last``, too, is convex as far as the step went."""
     moved = served.angles - before
-    return last.model.convex_around(last.angles, WIDER * float(abs(moved[idamax(moved)])))
+    return last.model.convex_around(last.angles, REACH * abs(moved.item(idamax(moved))))

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from collections.abc import Hashable
+from functools import cached_property
 from typing import Any
 from typing import TypeVar
 
@@ -23,7 +24,8 @@ from scipy.linalg.lapack import dppsv
 from scipy.linalg.lapack import dpptrf
 from scipy.linalg.lapack import dsyevd
 
-from ctr_pvs.convexity import least_cosine
+from ctr_pvs.convexity import REACH
+from ctr_pvs.convexity import least_cosines
 from ctr_pvs.energy import TorsionEnergy
 from ctr_pvs.fidelity import ellipse
 from ctr_pvs.fidelity import tip_share
@@ -42,8 +44,6 @@ FINER = 2
 #: A Newton step shorter than this [rad] leaves about its square: time to look at the residual.
 LAST_STEP = 2e-6
 MOST_STEPS = 8
-#: The branch between two states may leave the straight line between them by this share of the distance.
-WIDER = 1.25
 #: Largest change [rad] of the angle between two tubes in one step.
 LARGEST_TURN = 1.0
 
@@ -106,12 +106,23 @@ class ServingModel:
         self.form = PackedForm(self.pairs, self.n, tangents=True)
         self.check_form = PackedForm(self.pairs, self.finer, tangents=False)
         self.weights = _weights(energy)[:, self.order]
-        self.tip_shares = _tip_shares(energy, solved)[self.order]
         self.twist_norm = float(np.linalg.norm(energy.angle_map, axis=2).max(initial=0.0))
         self.tubes = energy.materials.robot.n_tubes
         self.no_answers = np.zeros((self.tubes, self.n))
         self._prepared: dict[Hashable, Any] = {}
         self._first_twist = self._twist_at_first_order()
+
+    @cached_property
+    def tip_shares(self) -> Array:
+        """(n + extra,) how much of a change of each unknown is let count for the tip: all of those solved for."""
+        shares = np.ones(self.finer)
+        for block in self.energy.space.blocks:
+            if block.basis.degree:
+                degree = np.tile(np.arange(block.basis.degree + 1), block.frame.shape[1] * block.basis.panels)
+                shares[block.columns] = tip_share(ellipse(self.energy.materials, block.section), degree)
+        shares = shares[self.order]
+        shares[: self.n] = 1.0
+        return shares
 
     def _twist_at_first_order(self) -> list[tuple[int, int, float, float]]:
         """Per pair of tubes: strength [m] and phase of the sine that tells how far twist moves the tip at first order.
@@ -224,12 +235,13 @@ class ServingModel:
             turned = abs(moved.item(idamax(moved)))
             if turned > LARGEST_TURN:
                 return None
-            reach += WIDER * turned
+            reach += REACH * turned
         sines[-1] = reach
         residual, change, info = self._factorised(z, sines)
         if info and before is not None:
             # Near a fold: bound every cosine by its own least value rather than all by the largest change.
-            sines[: self.rows], sines[-1] = self._least_cosines(before, moved, slack), 0.0
+            theta = slice(self.rows, 2 * self.rows)
+            sines[: self.rows], sines[-1] = least_cosines(before[theta], angles[theta], slack), 0.0
             residual, change, info = self._factorised(z, sines)
         if info:
             return None
@@ -245,13 +257,6 @@ class ServingModel:
         change, info = dppsv(self.finer, out, out[size:], 0, 1)
         return residual, change, info
 
-    def _least_cosines(self, before: Array, moved: Array, slack: float) -> Array:
-        """(R,) least cos(theta) on the way of ``moved`` from ``before``, and a share of it beyond either end."""
-        start, way = before[self.rows : 2 * self.rows], moved[self.rows : 2 * self.rows]
-        beyond = (WIDER - 1.0) * np.abs(way) + slack
-        end = start + way
-        return least_cosine(np.minimum(start, end) - beyond, np.maximum(start, end) + beyond)
-
 
 def _solved_for(energy: TorsionEnergy) -> NDArray[np.bool_]:
     """(n,) true for the unknowns below the two highest degrees of their section; constants are always solved for."""
@@ -261,16 +266,6 @@ def _solved_for(energy: TorsionEnergy) -> NDArray[np.bool_]:
         kept = np.arange(basis.degree + 1) <= max(0, basis.degree - FINER)
         parts.append(np.tile(kept, block.frame.shape[1] * basis.panels))
     return np.concatenate([np.zeros(0, dtype=bool), *parts])
-
-
-def _tip_shares(energy: TorsionEnergy, solved: NDArray[np.bool_]) -> Array:
-    """(n,) how much of a change of each unknown is let count for the tip: all of those solved for."""
-    shares = np.ones(energy.n)
-    for block in energy.space.blocks:
-        if block.basis.degree:
-            degree = np.tile(np.arange(block.basis.degree + 1), block.frame.shape[1] * block.basis.panels)
-            shares[block.columns] = tip_share(ellipse(energy.materials, block.section), degree)
-    return np.where(solved, 1.0, shares)
 
 
 def _weights(energy: TorsionEnergy) -> Array:

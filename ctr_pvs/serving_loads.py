@@ -27,10 +27,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ctr_pvs.actuation import Loads
+from ctr_pvs.actuation import boundary_forces
 from ctr_pvs.robot import Segment
 from ctr_pvs.sections import ABSENT
 from ctr_pvs.sections import Domain
-from ctr_pvs.sections import Event
 from ctr_pvs.serving import ServingModel
 
 Array = NDArray[np.float64]
@@ -47,7 +47,7 @@ class PreparedLoads:
         self.kink = rows.domain.kinked_tubes()
         self.kink.flags.writeable = False  # shared by all answers
         kinked = np.flatnonzero(self.kink)
-        outputs = np.concatenate([-rows.torque[0], _forces(rows, 1), _forces(rows, -1)[kinked]])
+        outputs = np.concatenate([-rows.torque[0], rows.forces(1), rows.forces(-1)[kinked]])
         # Both sides are taken from one number where there is no kink, and so are equal to the last bit.
         self._sides = np.repeat(np.arange(self.tubes, 2 * self.tubes)[:, None], 2, axis=1)
         self._sides[kinked, 0] = 2 * self.tubes + np.arange(len(kinked))
@@ -261,69 +261,29 @@ class _Rows:
             self.write(table, self.angles.second[column], column, -pull)
         return table
 
+    def forces(self, side: int) -> Array:
+        """(N, C) dE/dD [N] towards ``side`` (+1, -1)."""
+        return self.slide + boundary_forces(self.domain, self, side)
 
-def _forces(rows: _Rows, side: int) -> Array:
-    """(N, C) dE/dD [N] towards ``side`` (+1, -1)."""
-    force = rows.slide.copy()
-    for tube in range(rows.model.tubes):
-        _add_guide_force(rows, force[tube], tube, side)
-    for index, events in enumerate(rows.domain.events):
-        for event in events:
-            if (side < 0) if index == 0 else len(events) > 1:
-                force[event.tube] -= _opening(rows, index, event, side)
-            elif index > 0:
-                force[event.tube] -= rows.right[index - 1]
-                if index < rows.domain.n_sections:
-                    force[event.tube] -= rows.left[index]
-    return force
+    def thin(self, index: int, segments: Indices) -> Array:
+        row, one = np.zeros(self.size), self.angles.one
+        present: list[tuple[int, Segment, complex]] = []
+        for tube in np.flatnonzero(segments != ABSENT).tolist():
+            segment = self.materials.segment(tube, int(segments[tube]))
+            kappa = self.pre_curvature(tube, int(segments[tube]), index)
+            present.append((tube, segment, segment.bending_stiffness * kappa))
+            row[self.square(index, tube)] -= 0.5 / segment.torsional_stiffness
+        total = sum(segment.bending_stiffness for _, segment, _ in present)
+        for _, segment, moment in present:
+            row[one] += 0.5 * abs(moment) ** 2 * (1.0 / segment.bending_stiffness - 1.0 / total)
+        for (first, _, before), (second, _, after) in itertools.combinations(present, 2):
+            column, product = self.angles.columns[index, first, second], before.conjugate() * after / total
+            row[column] -= product.real
+            row[one // 2 + column] += product.imag
+        return row
 
-
-def _opening(rows: _Rows, index: int, event: Event, side: int) -> Array:
-    """(C,) energy per motion of ``event`` along s when it parts from what else is on boundary ``index``."""
-    domain = rows.domain
-    segments = [ABSENT] * rows.model.tubes
-    if side > 0:
-        segments = domain.segment[index - 1].tolist()
-        segments[event.tube] = event.after
-        return rows.right[index - 1] - _thin_section(rows, index, segments)
-    beyond = index < domain.n_sections
-    if beyond:
-        segments = domain.segment[index].tolist()
-    segments[event.tube] = event.before
-    thin = _thin_section(rows, index, segments)
-    return rows.left[index] + thin if beyond else thin
-
-
-def _thin_section(rows: _Rows, index: int, segments: list[int]) -> Array:
-    """(C,) energy per length [N] of a vanishing section at boundary ``index`` with one segment per tube."""
-    row, one = np.zeros(rows.size), rows.angles.one
-    present: list[tuple[int, Segment, complex]] = []
-    for tube, number in enumerate(segments):
-        if number != ABSENT:
-            segment = rows.materials.segment(tube, number)
-            present.append((tube, segment, segment.bending_stiffness * rows.pre_curvature(tube, number, index)))
-            row[rows.square(index, tube)] -= 0.5 / segment.torsional_stiffness
-    total = sum(segment.bending_stiffness for _, segment, _ in present)
-    for _, segment, moment in present:
-        row[one] += 0.5 * abs(moment) ** 2 * (1.0 / segment.bending_stiffness - 1.0 / total)
-    for (first, _, before), (second, _, after) in itertools.combinations(present, 2):
-        column, product = rows.angles.columns[index, first, second], before.conjugate() * after / total
-        row[column] -= product.real
-        row[one // 2 + column] += product.imag
-    return row
-
-
-def _add_guide_force(rows: _Rows, row: Array, tube: int, side: int) -> None:
-    """Adds to ``row`` (C,) the energy per dD [N] of guiding more of a tube: straightening and twisting it."""
-    index = int(rows.domain.guide_segment[tube])
-    on_orifice = [event.after for event in rows.domain.events[0] if event.tube == tube]
-    if side > 0 and on_orifice:
-        index = on_orifice[0]
-    elif index == ABSENT:  # its base is on the orifice: the first segment goes in
-        index = 0
-    if index == ABSENT:  # its tip is on the orifice: nothing is left to go in
-        return
-    segment = rows.materials.segment(tube, index)
-    kappa = abs(rows.pre_curvature(tube, index, 0))
-    row[rows.angles.one] += 0.5 * segment.bending_stiffness * kappa**2
-    row[rows.square(0, tube)] -= 0.5 / segment.torsional_stiffness
+    def guide(self, tube: int, segment: int) -> Array:
+        row, guided = np.zeros(self.size), self.materials.segment(tube, segment)
+        row[self.angles.one] = 0.5 * guided.bending_stiffness * abs(self.pre_curvature(tube, segment, 0)) ** 2
+        row[self.square(0, tube)] = -0.5 / guided.torsional_stiffness
+        return row

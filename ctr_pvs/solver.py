@@ -11,13 +11,12 @@ from numpy.typing import NDArray
 from ctr_pvs.batch import Batch
 from ctr_pvs.batch import BatchSolver
 from ctr_pvs.batch import Progress
+from ctr_pvs.continuation import DEGREES
 from ctr_pvs.continuation import State
 from ctr_pvs.equilibria import equilibria
 from ctr_pvs.equilibrium import Equilibrium
 from ctr_pvs.errors import FieldError
-from ctr_pvs.full_solution import FullSolution
 from ctr_pvs.models import Models
-from ctr_pvs.refine import DEGREES
 from ctr_pvs.refine import Refined
 from ctr_pvs.refine import refine_full
 from ctr_pvs.renda2021 import check_renda2021
@@ -225,7 +224,7 @@ class EquilibriumSolver:
         snaps: tuple[Snap, ...],
         iterations: int,
         note: str,
-        full: Refined[FullSolution] | None = None,
+        full: Refined | None = None,
     ) -> Equilibrium:
         """The answer, with its status and message."""
         served = position.served

@@ -14,6 +14,7 @@ import itertools
 
 import numpy as np
 from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
 
 from ctr_pvs import Robot
 
@@ -99,3 +100,25 @@ def tip_position(robot: Robot, D: np.ndarray, orifice_angles: np.ndarray, base_t
 
         state = solve_ivp(slope, (a, b), state, **TIGHT).y[:, -1]
     return state[-3:]
+
+
+def integrate_rod(laws, s):
+    """Rotations (n, 3, 3) and positions (n, 3) at ``s`` of rods with curvature laws ((length, k(s)), ..), by DOP853."""
+    state, start = np.concatenate([np.eye(3).ravel(), np.zeros(3)]), 0.0
+    rows = np.empty((len(s), 12))
+    for length, k in laws:
+
+        def slope(x, y, k=k):
+            turn = np.array([[0, -k(x).imag, k(x).real], [k(x).imag, 0, 0], [-k(x).real, 0, 0]])
+            frame = y[:9].reshape(3, 3)
+            return np.concatenate([(frame @ turn).ravel(), frame[:, 0]])
+
+        run = solve_ivp(slope, (0.0, length), state, rtol=1e-12, atol=1e-14, method="DOP853", dense_output=True)
+        here = (s >= start) & (s <= start + length + 1e-15)
+        rows[here] = run.sol(np.minimum(s[here] - start, length)).T
+        state, start = run.y[:, -1], start + length
+    return rows[:, :9].reshape(-1, 3, 3), rows[:, 9:]
+
+
+def rolls(psi):
+    return Rotation.from_rotvec(psi[:, None] * np.array([1.0, 0.0, 0.0]))
