@@ -47,7 +47,15 @@ EXECUTORS = {
     "single": "SingleThreadedExecutor",
     "multi": "MultiThreadedExecutor, 2 threads",
 }
-NODES = {"node": "the node", "objects": "the node, messages as Python objects", "echo": "echo, nothing solved"}
+#: What runs, whether its commands slide the tubes, too, and what that is called.
+NODES = [
+    ("node", False, "the node"),
+    ("node", True, "the node, every command also slides the tubes"),
+    ("polling", False, "the node, polling"),
+    ("polling", True, "the node, polling, every command also slides the tubes"),
+    ("objects", False, "the node, messages as Python objects"),
+    ("echo", False, "echo, nothing solved"),
+]
 
 
 class Measured:
@@ -92,12 +100,14 @@ def timed_node(what: str, executor: str) -> Iterator[Measured]:
         measured.read(path)
 
 
-def measure(what: str, executor: str, rate: float, count: int, busy: bool = False) -> tuple[Run, Measured, str]:
+def measure(
+    what: str, executor: str, rate: float, count: int, sliding: bool = False, busy: bool = False
+) -> tuple[Run, Measured, str]:
     """One run; ``busy`` with a client that keeps the service at work all the time, and says what it saw."""
     node = rclpy.create_node("paced_client")
     said = ""
     with timed_node(what, executor) as measured:
-        client = PacedClient(node)
+        client = PacedClient(node, sliding)
         client.connect()
         if busy:
             load = subprocess.Popen(
@@ -132,9 +142,9 @@ def executors_table(count: int) -> str:
 
 def nodes_table(count: int) -> str:
     rows = []
-    for what, name in NODES.items():
+    for what, sliding, name in NODES:
         for rate in RATES:
-            run, measured, _ = measure(what, "events", rate, count)
+            run, measured, _ = measure(what, "events", rate, count, sliding)
             rows.append(
                 [f"{name}, {rate:.0f} Hz", *row(run, measured), measured.share("solve"), measured.share("publish")]
             )
@@ -144,7 +154,7 @@ def nodes_table(count: int) -> str:
 def service_table(count: int) -> str:
     rows = []
     for busy, name in ((False, "service idle"), (True, "service always at work")):
-        run, measured, said = measure("node", "events", RATES[0], count, busy)
+        run, measured, said = measure("node", "events", RATES[0], count, busy=busy)
         rows.append([f"{name}, {RATES[0]:.0f} Hz", *row(run, measured), said])
     return table(["", *HEAD, "service: budget 1 s, answered within"], rows)
 

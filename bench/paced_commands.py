@@ -25,10 +25,15 @@ STAMPED = {"setpoint_js": JointState, "setpoint_cp": PoseStamped, "backbone": Po
 #: Commands go back and forth between these angles of the inner tube [deg] in steps of 0.1 deg, partial overlap.
 LOW, HIGH, STEP = 100.0, 110.0, 0.1
 D = (0.0935, 0.1705)
+#: What the tubes slide out with each step where they slide at all [m].
+SLIDE = (3e-5, 1e-4)
 #: Offset of the stamp in a serialized message that begins with a header.
 STAMP = struct.Struct("<4xi")
 TIMEOUT = 20.0  # s
 SETTLE = 0.5  # s, before and after a run
+#: s; in the first seconds after a process has joined, Fast DDS looks at its port in shared memory, and now and then
+#: that holds up a publisher for a third of a second (its issue 6535).
+JOINING = 4.0
 
 
 @dataclass(frozen=True)
@@ -45,19 +50,24 @@ class Run:
         return 1e6 * float(np.percentile(self.ages, percent)) if len(self.ages) else float("nan")
 
 
-def command(number: int) -> bytes:
+def command(number: int, sliding: bool) -> bytes:
     """Serialized command; its stamp is ``number`` seconds."""
     steps = round((HIGH - LOW) / STEP)
-    angle = LOW + STEP * abs(number % (2 * steps) - steps)
-    message = JointState(name=JOINTS, position=[0.0, D[0], math.radians(angle), D[1]])
+    step = abs(number % (2 * steps) - steps)
+    outer, inner = (place + sliding * step * slide for place, slide in zip(D, SLIDE, strict=True))
+    message = JointState(name=JOINTS, position=[0.0, outer, math.radians(LOW + STEP * step), inner])
     message.header.stamp.sec = number
     return serialize_message(message)
 
 
 class PacedClient:
-    """Sends through ``node`` and listens with raw subscribers, so that decoding is not what is measured."""
+    """Sends through ``node`` and listens with raw subscribers, so that decoding is not what is measured.
 
-    def __init__(self, node: Node) -> None:
+    sliding : whether commands also move the tubes' bases.
+    """
+
+    def __init__(self, node: Node, sliding: bool = False) -> None:
+        self._sliding = sliding
         self._arrivals: dict[int, list[float]] = defaultdict(list)
         self._margins = 0
         every = QoSProfile(depth=100)
@@ -92,8 +102,9 @@ class PacedClient:
         """Wait for the node, and for the answer to a first command."""
         self.spin_until(lambda: self._publisher.get_subscription_count() > 0)
         self.spin_for(SETTLE)
-        self._publisher.publish(command(self._number()))
+        self._publisher.publish(command(self._number(), self._sliding))
         self.spin_until(lambda: any(len(arrivals) == len(STAMPED) for arrivals in self._arrivals.values()))
+        self.spin_for(JOINING)
 
     def _number(self) -> int:
         self._next += 1
@@ -102,7 +113,7 @@ class PacedClient:
     def run(self, rate: float, count: int) -> Run:
         """``count`` commands, ``rate`` a second. A command that is late is not made up for by a hurried one."""
         numbers = [self._number() for _ in range(count)]
-        messages = [command(number) for number in numbers]
+        messages = [command(number, self._sliding) for number in numbers]
         self.spin_for(SETTLE)
         margins = self._margins
         sent = {}
