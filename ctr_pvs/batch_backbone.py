@@ -221,7 +221,7 @@ def _square(z: ComplexArray) -> Array:
 
 
 def _division(values: Values, tolerance: float) -> Indices:
-    """(M, 2, K) parts and Gauss points of each section, 0 where it is an arc; as ``backbone_plan`` has them."""
+    """(M, 2, K) parts and Gauss points of each section, 0 where it is an arc; as ``backbone_cuts`` has them."""
     if tolerance not in values.divisions:
         values.divisions[tolerance] = _divided(values, tolerance)
     return values.divisions[tolerance]

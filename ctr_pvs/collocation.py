@@ -66,11 +66,34 @@ def collocation(nodes: int) -> Collocation:
 
 def interpolation(nodes: int, x: Array) -> tuple[Array, Array]:
     """(g, G) matrices from values at the ``nodes`` Gauss points to the interpolant at ``x`` (g,), and to its integral
-    from 0, by its Legendre expansion."""
+    from 0."""
+    values, integrals = squared_sines(nodes, x) @ interpolator(nodes)
+    return values, integrals
+
+
+def squared_sines(degree: int, x: Array) -> Array:
+    """(g, degree + 1) 1 and sin^2(k phi) for k = 1, .. at x = sin^2 phi: polynomials of degree k in ``x`` (g,).
+
+    They are (1 - T_k(1 - 2 x)) / 2 with Chebyshev's T_k, as good to expand in; at 0 all but the first are exactly 0.
+    """
+    out: Array = np.sin(np.arcsin(np.sqrt(x))[:, None] * np.arange(degree + 1.0))
+    out *= out
+    out[:, 0] = 1.0
+    return out
+
+
+@lru_cache(maxsize=64)
+def interpolator(nodes: int) -> Array:
+    """(2, G + 1, G) from values at the ``nodes`` Gauss points to the expansions, in ``squared_sines``, of the
+    interpolant and of its integral from 0; by its Legendre expansion."""
     rule = gauss_legendre(nodes)
     weighted = legendre(nodes - 1, rule.x)[0].T * rule.weights
-    values, integrals = legendre(nodes - 1, x)
-    return values @ weighted, integrals @ weighted
+    x = np.sin(np.linspace(0.0, 0.5 * np.pi, nodes + 1)) ** 2
+    tables = np.stack(legendre(nodes - 1, x)) @ weighted
+    table = np.linalg.solve(squared_sines(nodes, x), tables).astype(float)
+    table[1, 0] = 0.0  # there is no integral at 0
+    table.flags.writeable = False
+    return table
 
 
 def closed_interpolation(nodes: int, x: Array) -> Array:

@@ -7,7 +7,8 @@ the tangents at the same points are integrated by another.  Closed arcs need few
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from functools import lru_cache
+from itertools import accumulate
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,15 +17,13 @@ from ctr_pvs.backbone import QUATERNION
 from ctr_pvs.backbone import Backbone
 from ctr_pvs.backbone import orientation_of
 from ctr_pvs.basis import gauss_legendre
-from ctr_pvs.collocation import interpolation
+from ctr_pvs.collocation import interpolator
+from ctr_pvs.collocation import squared_sines
 from ctr_pvs.pieces import TINY
 from ctr_pvs.pieces import Arc
 from ctr_pvs.pieces import Bend
 from ctr_pvs.pieces import Piece
 from ctr_pvs.pieces import State
-
-if TYPE_CHECKING:
-    from ctr_pvs.backbone_plan import BackbonePlan
 
 Array = NDArray[np.float64]
 
@@ -35,43 +34,79 @@ HALF_I = np.array(0.5j)
 FROM_RATES = np.array([[0.0, 0.0, -2.0], [0.0, 2.0, 0.0], [-2.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
 NORMALISE = np.full(4, -0.5)
 THREE_HALVES = np.array(1.5)
+#: Orders of pieces whose layouts are kept.
+KEPT = 64
+
+
+class Layout:
+    """What does not depend on the lengths of pieces of these kinds (true for an arc) with ``nodes`` Gauss points each.
+
+    K Gauss points of all pieces: those of arcs first, ``on_arcs`` of them.
+
+    columns : of each piece along the rod, its Gauss points.  piece (K,) : the piece of each.
+    owner (K, pieces) : 1 where the Gauss point lies on the piece; arcs (on_arcs, A), places (on_arcs, A) : for arcs
+    alone, 1 and the place relative to the length of the arc.  is_arc (pieces,).
+    """
+
+    def __init__(self, order: tuple[bool, ...], nodes: tuple[int, ...]) -> None:
+        self.is_arc = np.array(order)
+        arcs_first = sorted(range(len(order)), key=lambda index: not order[index])
+        counts = [nodes[index] for index in arcs_first]
+        ends = dict(zip(arcs_first, accumulate(counts), strict=True))
+        self.columns = [slice(ends[index] - count, ends[index]) for index, count in enumerate(nodes)]
+        self.piece = np.repeat(arcs_first, counts)
+        self.owner = np.eye(len(nodes))[self.piece]
+        self.on_arcs = sum(count for is_arc, count in zip(order, nodes, strict=True) if is_arc)
+        self.arcs = self.owner[: self.on_arcs, self.is_arc]
+        x = np.concatenate([gauss_legendre(count).x for count in counts])
+        self.places = x[: self.on_arcs, None] * self.arcs
+
+
+_layout = lru_cache(maxsize=KEPT)(Layout)
 
 
 class PosePlan:
-    """``count`` poses of ``plan``.
+    """``count`` poses on pieces of these kinds (true for an arc), ``lengths`` [m] and Gauss points ``nodes``.
+
+    rolls : matrices from z to the rolls at the starts of arcs, to the rates of these, and to the rolls at the Gauss
+    points of bends.
 
     s (count,) [m]; frames, integrals (count, K) : from values at the K Gauss points of all pieces, arcs first, to the
     poses, and to integrals from the orifice.
     """
 
-    def __init__(self, plan: BackbonePlan, count: int, nodes: list[int]) -> None:
-        lengths, order = plan.lengths, plan.arcs_first
-        self._ends = np.cumsum(lengths)
-        self.s = np.linspace(0.0, self._ends[-1], count)
-        self.frames, self.integrals = (np.zeros((count, sum(nodes))) for _ in range(2))
-        self._owner = np.repeat(np.eye(len(nodes))[order], [nodes[index] for index in order], axis=0)
-        first = 0
-        for index in order:
-            self._interpolate(index, slice(first, first + nodes[index]), lengths[index])
-            first += nodes[index]
-        arcs = order[: len(plan.arcs)]
-        self._on_arc = sum(nodes[index] for index in arcs)
-        self._arc_owner = self._owner[: self._on_arc, arcs]
-        self._half_places = 0.5 * plan.places(nodes)[: self._on_arc, None] * self._arc_owner
-        self._rolls = plan.roll_rows(nodes)
+    def __init__(
+        self,
+        count: int,
+        order: list[bool],
+        lengths: list[float],
+        nodes: list[int],
+        rolls: tuple[Array, Array, Array],
+    ) -> None:
+        layout, length = _layout(tuple(order), tuple(nodes)), np.array(lengths)
+        boundaries = np.array([0.0, *accumulate(lengths)])
+        self.s = np.linspace(0.0, boundaries[-1], count)
+        here = boundaries[1:-1].searchsorted(self.s)  # a boundary counts to the piece before it
+        x = np.minimum((self.s - boundaries[here]) / (length + TINY)[here], 1.0)
+        self.frames, self.integrals = self._interpolators(layout, nodes, x, boundaries)
+        self.integrals *= length[layout.piece]
+        self._owner, self._arc_owner, self._on_arc = layout.owner, layout.arcs, layout.on_arcs
+        places = layout.places * length[layout.is_arc]
+        self._half_places = 0.5 * places
+        starts, rates, points = rolls
+        self._rolls = np.concatenate([layout.arcs.dot(starts) + places.dot(rates), points])
 
-    def _interpolate(self, index: int, columns: slice, length: float) -> None:
-        """Fills ``frames`` and ``integrals`` for the Gauss points of one piece."""
-        end, nodes = self._ends[index], columns.stop - columns.start
-        start = self._ends[index - 1] if index else 0.0
-        beyond = self.s > end
-        here = (self.s > start) & ~beyond
-        if index == 0:
-            here |= self.s == 0.0
-        x = np.clip((self.s[here] - start) / max(length, TINY), 0.0, 1.0)
-        values, inside = interpolation(nodes, x)
-        self.frames[here, columns], self.integrals[here, columns] = values, length * inside
-        self.integrals[beyond, columns] = length * gauss_legendre(nodes).weights
+    def _interpolators(self, layout: Layout, nodes: list[int], x: Array, boundaries: Array) -> Array:
+        """(2, count, K) ``frames``, and ``integrals`` relative to the lengths of pieces, for poses at ``x`` (count,)
+        of theirs."""
+        out = np.zeros((2, len(x), len(layout.piece)))
+        functions = squared_sines(max(nodes), x)
+        first, ends = 0, self.s.searchsorted(boundaries[1:], "right").tolist()
+        for columns, count, last in zip(layout.columns, nodes, ends, strict=True):
+            out[:, first:last, columns] = functions[first:last, : count + 1] @ interpolator(count)
+            out[1, last:, columns] = gauss_legendre(count).weights
+            first = last
+        return out
 
     def poses(self, pieces: list[Piece], states: list[State], z: Array) -> Backbone:
         """The poses of ``pieces``, which ``z`` gives by the plan, with ``states`` at their ends."""
