@@ -14,13 +14,13 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ctr_pvs.basis import GaussRule
 from ctr_pvs.basis import gauss_legendre
+from ctr_pvs.lazy import lazy
 from ctr_pvs.materials import Materials
 from ctr_pvs.twist import Degrees
 from ctr_pvs.twist import TwistSpace
@@ -64,23 +64,25 @@ class TorsionEnergy:
     """E at one D and one choice of polynomial degrees, as a function of q (n,) and alpha (N,).
 
     n : number of unknowns; nodes : the coupled sections' Gauss points; angle_map (G, N, n) : psi = alpha + A q there.
+    s (G,) [m] : where they are; moment (G, N) : K_j kappa*_j [N m]; coupling (G,) : weight over sum of K.
     """
 
     def __init__(self, materials: Materials, degree: Degrees) -> None:
         self.materials = materials
         self.space = TwistSpace(materials, degree)
         self.n = self.space.n
-        self.nodes = [self._nodes(int(m), self.space.basis(int(m)).rule) for m in np.flatnonzero(materials.coupled)]
-        tubes = materials.robot.n_tubes
-        stacked = [self.space.angle_map(node.section, node.rule.x) for node in self.nodes]
-        self.angle_map = np.concatenate([np.zeros((0, tubes, self.n)), *stacked])
-        self.moment = np.concatenate(
-            [np.zeros((0, tubes), complex), *(node.bending * node.kappa for node in self.nodes)]
-        )
-        sums = np.concatenate([np.zeros(0), *(np.full(len(node.s), node.bending.sum()) for node in self.nodes)])
-        weights = np.concatenate([np.zeros(0), *(node.weight for node in self.nodes)])
-        self.coupling = weights / sums  # quadrature weight over total bending stiffness
-        self.slices = self._node_slices()
+        domain, places = materials.domain, self.space.unknowns.nodes
+        self.s = domain.boundaries[places.section] + domain.lengths[places.section] * places.x
+        self.moment = places.bending * materials.pre_curvature(places.section, self.s)
+        self.coupling = domain.lengths[places.section] * places.share  # quadrature weight over total bending stiffness
+
+    @lazy
+    def angle_map(self) -> Array:
+        return self.space.unknowns.nodes.integrals[:, None, :] * self.space.modes
+
+    @lazy
+    def nodes(self) -> list[SectionNodes]:
+        return [self._nodes(m, self.space.basis(m).rule) for m in self.materials.composition.coupled_sections.tolist()]
 
     def _nodes(self, m: int, rule: GaussRule) -> SectionNodes:
         domain = self.materials.domain
@@ -89,17 +91,19 @@ class TorsionEnergy:
         kappa = self.materials.pre_curvature(m, s)
         return SectionNodes(m, rule, s, length * rule.weights, self.materials.bending[m], kappa)
 
-    def _node_slices(self) -> list[slice]:
+    @lazy
+    def slices(self) -> list[slice]:
+        """Where the nodes of each section are among all."""
         ends = np.cumsum([0, *(len(node.s) for node in self.nodes)])
         return [slice(a, b) for a, b in itertools.pairwise(ends)]
 
-    @cached_property
+    @lazy
     def plain_nodes(self) -> list[SectionNodes]:
         """Gauss points of the sections whose energy does not depend on psi."""
         rule = gauss_legendre(PLAIN_NODES)
         return [self._nodes(int(m), rule) for m in np.flatnonzero(~self.materials.coupled)]
 
-    @cached_property
+    @lazy
     def all_nodes(self) -> list[SectionNodes]:
         """Gauss points of every section, from the orifice on."""
         return sorted([*self.nodes, *self.plain_nodes], key=lambda node: node.section)

@@ -22,6 +22,8 @@ from ctr_pvs.basis import gauss_legendre
 from ctr_pvs.materials import Materials
 from ctr_pvs.twist import panels_needed
 
+Array = NDArray[np.float64]
+
 #: Degrees above the first choice, tried in turn until the estimate is within tolerance.
 RAISES = (0, 1, 3, 6, 10, 15, 21)
 LOWEST_DEGREE, HIGHEST_DEGREE = 1, 28
@@ -38,13 +40,14 @@ GLANCE = 4
 def first_degrees(materials: Materials, tolerance: float) -> tuple[int, ...]:
     """Degree of the torques in each section from D alone; 0 where nothing couples the tubes."""
     degrees = [0] * materials.domain.n_sections
-    coupled = np.flatnonzero(materials.coupled)
-    if not len(coupled):
-        return tuple(degrees)
-    swing = _swing(materials, int(coupled[0]))
-    for m in coupled.tolist():
-        coupling = materials.coupling(m)
-        degrees[m] = _degree(ellipse(materials, m), swing * min(1.0, coupling), tolerance)
+    coupled = materials.composition.coupled_sections.tolist()
+    if coupled:
+        s, bend = _glance(materials)
+        swing = _swing(materials, coupled[0], s, bend)
+        turns = _turns(materials, bend)
+        for m in coupled:
+            coupling = materials.coupling(m)
+            degrees[m] = _degree(_ellipse(coupling, turns[m]), swing * min(1.0, coupling), tolerance)
     return tuple(degrees)
 
 
@@ -55,13 +58,16 @@ def raised_degrees(degrees: tuple[int, ...], by: int) -> tuple[int, ...]:
 
 def ellipse(materials: Materials, m: int) -> float:
     """The size rho by which Legendre coefficients fall with each degree on the panels of section m."""
-    coupling = materials.coupling(m)
-    bandwidth = coupling + TURN_SHARE * _turn(materials, m) ** 2
+    return _ellipse(materials.coupling(m), _turns(materials, _glance(materials)[1])[m])
+
+
+def _ellipse(coupling: float, turn: float) -> float:
+    bandwidth = coupling + TURN_SHARE * turn**2
     width = math.pi / math.sqrt(max(bandwidth / panels_needed(coupling) ** 2, 1e-6))
     return width + math.hypot(width, 1.0)
 
 
-def tip_share(rho: float, degree: NDArray[np.int64]) -> NDArray[np.float64]:
+def tip_share(rho: float, degree: NDArray[np.int64]) -> Array:
     """Share of a twist of each ``degree`` (...) of its Legendre polynomials that is taken to count for the tip."""
     return np.minimum(1.0, CAUTION * rho ** -(degree - 1.0))
 
@@ -72,21 +78,21 @@ def _degree(rho: float, motion: float, tolerance: float) -> int:
     return min(max(LOWEST_DEGREE, math.ceil(needed)), HIGHEST_DEGREE)
 
 
-def _swing(materials: Materials, first: int) -> float:
+def _glance(materials: Materials) -> tuple[Array, Array]:
+    """(g, M) some places [m] of each section, and the curvature [1/m] there if all tubes bent to the same side."""
+    domain, made = materials.domain, materials.composition
+    s = domain.boundaries[:-1] + gauss_legendre(GLANCE).x[:, None] * domain.lengths
+    return s, (np.abs(materials.pre_curvature(made.sections, s)) * made.share).sum(axis=2)
+
+
+def _swing(materials: Materials, first: int, s: Array, bend: Array) -> float:
     """Motion of the tip [m] if all tubes turned by 1 rad from section ``first`` on, added up without sign."""
-    rule, length, total = gauss_legendre(GLANCE), materials.domain.length, 0.0
-    for m in range(first, materials.domain.n_sections):
-        s = materials.domain.boundaries[m] + rule.x * materials.domain.lengths[m]
-        kappa = np.abs(materials.pre_curvature(m, s)) @ materials.bending[m] / materials.bending[m].sum()
-        total += float(materials.domain.lengths[m] * (rule.weights * (length - s)) @ kappa)
-    return total
+    weights, domain = gauss_legendre(GLANCE).weights, materials.domain
+    return float(weights.dot((domain.length - s) * bend)[first:].dot(domain.lengths[first:]))
 
 
-def _turn(materials: Materials, m: int) -> float:
-    """Largest turn [rad] of a tube's pre-curvature, and of the backbone if all bent it to the same side, along section
-    m."""
-    segments = materials.domain.segment[m]
-    turn = max(abs(materials.segment(j, int(segments[j])).turn) for j in materials.curved_tubes[m])
-    s = materials.domain.boundaries[m] + gauss_legendre(GLANCE).x * materials.domain.lengths[m]
-    bend = np.abs(materials.pre_curvature(m, s)) @ materials.bending[m] / materials.bending[m].sum()
-    return float((turn + bend.max()) * materials.domain.lengths[m])
+def _turns(materials: Materials, bend: Array) -> list[float]:
+    """Largest turn [rad] of a tube's pre-curvature, and of the backbone if all bent it to the same side, along each
+    section."""
+    turns: list[float] = ((materials.composition.fastest_turn + bend.max(axis=0)) * materials.domain.lengths).tolist()
+    return turns

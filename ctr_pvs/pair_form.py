@@ -10,12 +10,17 @@ Hessians are in LAPACK's packed storage: the upper triangle, column by column, s
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
+from ctr_pvs.composition import sealed
 from ctr_pvs.energy import TorsionEnergy
+from ctr_pvs.unknowns import Unknowns
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 
 #: Up to this many entries one table that maps (cos, sin) to (Hessian, gradient) is quicker than a matrix product.
 LARGEST_TABLE = 40_000
@@ -30,19 +35,16 @@ class Pairs:
     """
 
     def __init__(self, energy: TorsionEnergy, order: NDArray[np.int64] | slice = slice(None)) -> None:
-        first, second = np.triu_indices(energy.materials.robot.n_tubes, 1)
-        product = energy.moment[:, first].conj() * energy.moment[:, second]
-        node, pair = np.nonzero(product)
-        product = product[node, pair]
-        self.tubes, self.pair = list(zip(first.tolist(), second.tolist(), strict=True)), pair
-        self.first, self.second, self.node = first[pair], second[pair], node
-        self.amplitude = energy.coupling[node] * np.abs(product)
-        self.phase = np.angle(product)
-        self.map = (energy.angle_map[node, self.second] - energy.angle_map[node, self.first])[:, order]
-        self.turns = np.zeros((len(node), energy.materials.robot.n_tubes))
-        row = np.arange(len(node))
-        self.turns[row, self.first] = -1.0
-        self.turns[row, self.second] = 1.0
+        space = energy.space
+        rows = _rows(space.unknowns)
+        self.tubes, self.turns, self._ends = rows.tubes, rows.turns, rows.ends
+        self.pair, self.node, self.first, self.second = rows.pair, rows.node, rows.first, rows.second
+        #: (R,) amplitude exp(i phase)
+        self.wave = energy.coupling[rows.node] * (
+            energy.moment[rows.node, rows.first].conj() * energy.moment[rows.node, rows.second]
+        )
+        self.amplitude, self.phase = np.abs(self.wave), np.angle(self.wave)
+        self.map = (rows.integrals * (space.modes[rows.second] - space.modes[rows.first]))[:, order]
 
     def angles(self, psi: Array) -> Array:
         """theta (R,) [rad] between the turned pre-curvatures, from psi (G, N) at the Gauss points."""
@@ -50,15 +52,49 @@ class Pairs:
 
     def waves(self, n: int) -> Array:
         """(2 R + 2, n + N + 1): maps (q, alpha, 1) to the angles whose sines are cos(theta), sin(theta), 1 and 0."""
-        rows, tubes = self.turns.shape
-        table = np.zeros((2 * rows + 2, n + tubes + 1))
-        for start, quarter in ((0, 0.5 * np.pi), (rows, 0.0)):
-            part = slice(start, start + rows)
-            table[part, :n] = self.map[:, :n]
-            table[part, n:-1] = self.turns
-            table[part, -1] = self.phase + quarter
-        table[2 * rows, -1] = 0.5 * np.pi
+        rows = len(self.amplitude)
+        table = np.empty((2 * rows + 2, n + self._ends.shape[1]))
+        table[:rows, :n] = table[rows:-2, :n] = self.map[:, :n]
+        table[-2:, :n] = 0.0
+        table[:, n:] = self._ends
+        table[:rows, -1] += self.phase
+        table[rows:-2, -1] = self.phase
         return table
+
+
+class _Rows:
+    """What the rows of ``Pairs`` are about, whatever the lengths of sections; integrals (R, n) of the unknowns'
+    functions."""
+
+    def __init__(self, given: Unknowns) -> None:
+        tubes, places = given.composition.bending.shape[1], given.nodes
+        first, second = np.triu_indices(tubes, 1)
+        curved = given.composition.curved[places.section]
+        self.node, self.pair = np.nonzero(curved[:, first] & curved[:, second])
+        self.tubes = list(zip(first.tolist(), second.tolist(), strict=True))
+        self.first, self.second = first[self.pair], second[self.pair]
+        self.integrals = places.integrals[self.node]
+        self.turns = np.zeros((len(self.node), tubes))
+        row = np.arange(len(self.node))
+        self.turns[row, self.first] = -1.0
+        self.turns[row, self.second] = 1.0
+        #: (2 R + 2, N + 1) the columns of ``Pairs.waves`` for alpha and 1, less the phases
+        self.ends = np.zeros((2 * len(row) + 2, tubes + 1))
+        self.ends[: len(row), :-1] = self.ends[len(row) : -2, :-1] = self.turns
+        self.ends[: len(row), -1] = self.ends[-2, -1] = 0.5 * np.pi
+        sealed(self)
+
+
+@lru_cache(maxsize=128)
+def _rows(given: Unknowns) -> _Rows:
+    return _Rows(given)
+
+
+@lru_cache(maxsize=128)
+def _packed(n: int) -> tuple[Indices, Indices, Array]:
+    """Columns and rows of the entries in packed storage, and 1 for those of the diagonal."""
+    column, row = np.tril_indices(n)
+    return column, row, (column == row).astype(float)
 
 
 class PackedForm:
@@ -73,7 +109,7 @@ class PackedForm:
         self.pairs = pairs
         self.turns = pairs.turns if tangents else pairs.turns[:, :0]
         self.sides = 1 + self.turns.shape[1]
-        self._column, self._row = np.tril_indices(n)
+        self._column, self._row, self._diagonal = _packed(n)
         rows = len(pairs.amplitude)
         self.map = np.ascontiguousarray(pairs.map[:, :n])
         entries = (self.size + n * self.sides) * (2 * rows + 2)
@@ -86,14 +122,16 @@ class PackedForm:
         return matrix[self._column, self._row]
 
     def _tabulate(self) -> Array:
-        rows, scaled = len(self.pairs.amplitude), self.map.T * self.pairs.amplitude
-        table = np.zeros((self.size + self.n * self.sides, 2 * rows + 2))
-        table[: self.size, :rows] = scaled[self._column] * self.map.T[self._row]
-        table[: self.size, 2 * rows] = self._column == self._row
-        table[: self.size, 2 * rows + 1] = -table[: self.size, :rows].sum(axis=1)
-        table[self.size : self.size + self.n, rows : 2 * rows] = scaled
-        answers = scaled[None] * self.turns.T[:, None, :]
-        table[self.size + self.n :, :rows] = answers.reshape(self.n * (self.sides - 1), rows)
+        size, n, rows = self.size, self.n, len(self.pairs.amplitude)
+        across = np.ascontiguousarray(self.map.T)
+        scaled = across * self.pairs.amplitude
+        table = np.zeros((size + n * self.sides, 2 * rows + 2))
+        products = np.multiply(scaled.take(self._column, axis=0), across.take(self._row, axis=0), table[:size, :rows])
+        table[:size, -2] = self._diagonal
+        np.negative(products.sum(axis=1), table[:size, -1])
+        table[size : size + n, rows:-2] = scaled
+        answers = table[size + n :].reshape(self.sides - 1, n, 2 * rows + 2)
+        np.multiply(scaled, self.turns.T[:, None, :], answers[:, :, :rows])
         return table
 
     def terms(self, sines: Array) -> Array:

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from functools import lru_cache
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +34,12 @@ class Event:
     tube: int
     before: int
     after: int
+
+
+#: Which segments the sections and the guide hold: the shape and bytes of ``Domain.segment``, and ``guide_segment``'s.
+Topology: TypeAlias = tuple[int, int, bytes, bytes]
+#: Where an event lies [m], its tube, the index of its break, and itself: in this order places are sorted.
+Place: TypeAlias = tuple[float, int, int, Event]
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,9 +80,9 @@ class Domain:
         return int(np.flatnonzero(reach != ABSENT)[-1])
 
     @cached_property
-    def topology(self) -> tuple[object, ...]:
+    def topology(self) -> Topology:
         """Equal for two domains whose sections hold the same segments in the same order."""
-        return (self.segment.shape, self.segment.tobytes(), self.guide_segment.tobytes())
+        return (*self.segment.shape, self.segment.tobytes(), self.guide_segment.tobytes())
 
     def kinked_tubes(self) -> NDArray[np.bool_]:
         """(N,) true where the energy has a kink in D_j: an event of tube j on the orifice or on another tube's
@@ -94,35 +102,45 @@ class Domain:
 
 def piecewise_domain(robot: Robot, D: NDArray[np.float64]) -> Domain:
     """The sections of ``robot`` for base positions ``D`` (N,) [m], already checked by ``Robot.check_command``."""
-    places: list[tuple[float, Event]] = []
-    at_orifice = np.full(robot.n_tubes, ABSENT)
-    guide = np.full(robot.n_tubes, ABSENT)
+    places: list[Place] = []
+    at_orifice = [ABSENT] * robot.n_tubes
+    guide = [ABSENT] * robot.n_tubes
     orifice_events: list[Event] = []
-    for tube, (material, base) in enumerate(zip(robot.tubes, D, strict=True)):
-        last = len(material.segments)
-        for index, place in enumerate(material.breaks - base):
-            event = Event(tube, index - 1 if index > 0 else ABSENT, index if index < last else ABSENT)
-            if place > SAME_PLACE:
-                places.append((float(place), event))
-                continue
-            # Passing the breaks in order, the last one not beyond the orifice tells what lies on either side of it.
-            at_orifice[tube] = event.after
-            if place >= -SAME_PLACE:
-                guide[tube] = event.before
-                if index > 0:  # a tube's base on the orifice is no event: it cannot come out any farther
-                    orifice_events.append(event)
-            else:
-                guide[tube] = event.after
+    for abscissa, tube, index, event in _events(robot):
+        place = abscissa - D.item(tube)
+        if place > SAME_PLACE:
+            places.append((place, tube, index, event))
+            continue
+        # Passing the breaks in order, the last one not beyond the orifice tells what lies on either side of it.
+        at_orifice[tube] = event.after
+        if place >= -SAME_PLACE:
+            guide[tube] = event.before
+            if index > 0:  # a tube's base on the orifice is no event: it cannot come out any farther
+                orifice_events.append(event)
+        else:
+            guide[tube] = event.after
     boundaries, events = _merge(places)
     segment = _segments(at_orifice, events)
-    return Domain(np.array(D, dtype=float), boundaries, segment, (tuple(orifice_events), *events), guide)
+    return Domain(np.array(D, dtype=float), boundaries, segment, (tuple(orifice_events), *events), np.array(guide))
 
 
-def _merge(places: list[tuple[float, Event]]) -> tuple[NDArray[np.float64], list[tuple[Event, ...]]]:
+@lru_cache(maxsize=64)
+def _events(robot: Robot) -> tuple[Place, ...]:
+    """Every break of every tube, by its abscissa [m]."""
+    places = []
+    for tube, material in enumerate(robot.tubes):
+        last = len(material.segments)
+        for index, abscissa in enumerate(material.breaks.tolist()):
+            event = Event(tube, index - 1 if index > 0 else ABSENT, index if index < last else ABSENT)
+            places.append((abscissa, tube, index, event))
+    return tuple(places)
+
+
+def _merge(places: list[Place]) -> tuple[NDArray[np.float64], list[tuple[Event, ...]]]:
     """Boundaries, orifice first, with the events of each; events within ``SAME_PLACE`` share one boundary."""
     boundaries = [0.0]
     events: list[list[Event]] = []
-    for place, event in sorted(places, key=lambda item: (item[0], item[1].tube)):
+    for place, _, _, event in sorted(places):
         if events and place - boundaries[-1] <= SAME_PLACE:
             events[-1].append(event)
         else:
@@ -131,12 +149,12 @@ def _merge(places: list[tuple[float, Event]]) -> tuple[NDArray[np.float64], list
     return np.array(boundaries), [tuple(group) for group in events]
 
 
-def _segments(at_orifice: NDArray[np.int64], events: list[tuple[Event, ...]]) -> NDArray[np.int64]:
+def _segments(at_orifice: list[int], events: list[tuple[Event, ...]]) -> NDArray[np.int64]:
     """(M, N) segment of each tube in each section, by walking from the orifice over the events."""
-    table = np.empty((len(events), len(at_orifice)), dtype=np.int64)
+    rows = []
     current = at_orifice.copy()
-    for index, group in enumerate(events):
-        table[index] = current
+    for group in events:
+        rows.append(tuple(current))
         for event in group:
             current[event.tube] = event.after
-    return table
+    return np.array(rows, dtype=np.int64).reshape(-1, len(current))

@@ -8,7 +8,6 @@ brings to the same degrees.
 from __future__ import annotations
 
 from collections import OrderedDict
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +22,7 @@ from ctr_pvs.energy import TorsionEnergy
 from ctr_pvs.fidelity import RAISES
 from ctr_pvs.fidelity import first_degrees
 from ctr_pvs.fidelity import raised_degrees
+from ctr_pvs.lazy import lazy
 from ctr_pvs.materials import Materials
 from ctr_pvs.relaxed import Relaxed
 from ctr_pvs.relaxed import relaxed_state
@@ -54,7 +54,7 @@ class Rungs:
         self.slack = min(max(LEAST_SLACK, SLACK * tolerance / length), MOST_SLACK)
         self._models: list[ServingModel] = []
 
-    @cached_property
+    @lazy
     def relaxed(self) -> Relaxed | None:
         """Where a cold start sets out."""
         return relaxed_state(TorsionEnergy(self.materials, DEGREES[0]))
@@ -207,9 +207,9 @@ def _guess(model: ServingModel, trail: list[Served], last: Position, alpha: Arra
             daxpy((alpha - last.alpha).dot(known.answers), z, model.n, -1.0)
             z[model.n : -1] = alpha
             return z, known.angles
-    z, before = _converted(
-        model, Position(alpha, model.energy.materials.domain.D, trail).state if trail else last.state
-    )
+    source = trail[-1] if trail else last.served
+    z = model.start(model.energy.space.carried(source.q, source.model.energy.space), source.alpha)
+    before = model.waves.dot(z)
     z[model.n : -1] = alpha
     return z, before
 

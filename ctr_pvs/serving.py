@@ -7,10 +7,11 @@ Newton step of the finer model is the estimate of what the coarser one leaves ou
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Callable
 from collections.abc import Hashable
-from functools import cached_property
+from functools import lru_cache
 from typing import Any
 from typing import TypeVar
 
@@ -29,12 +30,15 @@ from ctr_pvs.convexity import least_cosines
 from ctr_pvs.energy import TorsionEnergy
 from ctr_pvs.fidelity import ellipse
 from ctr_pvs.fidelity import tip_share
+from ctr_pvs.lazy import lazy
 from ctr_pvs.pair_form import PackedForm
 from ctr_pvs.pair_form import Pairs
 from ctr_pvs.solve import CONTRACTION
 from ctr_pvs.solve import RESIDUAL_TWIST
 from ctr_pvs.solve import residual_limit
+from ctr_pvs.swing import tip_weights
 from ctr_pvs.twist import Degrees
+from ctr_pvs.unknowns import Unknowns
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
@@ -97,22 +101,21 @@ class ServingModel:
 
     def __init__(self, energy: TorsionEnergy, degree: tuple[int, ...]) -> None:
         self.energy, self.degree = energy, degree
-        solved = _solved_for(energy)
-        self.order = np.concatenate([np.flatnonzero(solved), np.flatnonzero(~solved)])
-        self.n, self.finer = int(np.count_nonzero(solved)), energy.n
+        self.order, self.n = _order(energy.space.unknowns)
+        self.finer = energy.n
         self.pairs = Pairs(energy, self.order)
         self.rows = len(self.pairs.amplitude)
         self.waves = self.pairs.waves(self.n)
-        self.form = PackedForm(self.pairs, self.n, tangents=True)
         self.check_form = PackedForm(self.pairs, self.finer, tangents=False)
-        self.weights = _weights(energy)[:, self.order]
-        self.twist_norm = float(np.linalg.norm(energy.angle_map, axis=2).max(initial=0.0))
+        self.form = PackedForm(self.pairs, self.n, tangents=True)
+        self.weights = tip_weights(energy).take(self.order, axis=1)
+        squares = energy.space.unknowns.nodes.squares.dot((energy.space.modes**2).T)
+        self.twist_norm = math.sqrt(squares.max(initial=0.0))
         self.tubes = energy.materials.robot.n_tubes
         self.no_answers = np.zeros((self.tubes, self.n))
         self._prepared: dict[Hashable, Any] = {}
-        self._first_twist = self._twist_at_first_order()
 
-    @cached_property
+    @lazy
     def tip_shares(self) -> Array:
         """(n + extra,) how much of a change of each unknown is let count for the tip: all of those solved for."""
         shares = np.ones(self.finer)
@@ -124,21 +127,21 @@ class ServingModel:
         shares[: self.n] = 1.0
         return shares
 
-    def _twist_at_first_order(self) -> list[tuple[int, int, float, float]]:
+    @lazy
+    def _first_twist(self) -> list[tuple[int, int, float, float]]:
         """Per pair of tubes: strength [m] and phase of the sine that tells how far twist moves the tip at first order.
 
         The twist that torsional stiffness alone would hold, as if the coupling held it as much as it can at best: so
         that rather too many states are looked at again.
         """
-        pull = np.abs(self.weights[:, : self.n] @ self.form.map.T).sum(axis=0) * self.pairs.amplitude
-        stiffest = 1.0 + float(self.pairs.amplitude @ np.sum(self.form.map**2, axis=1))
-        waves = pull * np.exp(1j * self.pairs.phase) / stiffest
-        out = []
-        for index, (first, second) in enumerate(self.pairs.tubes):
-            total = waves[self.pairs.pair == index].sum()
-            if total:
-                out.append((first, second, float(abs(total)), float(np.angle(total))))
-        return out
+        strength = np.abs(self.weights[:, : self.n].dot(self.form.map.T)).sum(axis=0)
+        stiffest = 1.0 + float(self.pairs.amplitude.dot((self.form.map**2).sum(axis=1)))
+        waves = self.pairs.wave * (strength / stiffest)
+        parts = (
+            np.bincount(self.pairs.pair, part, len(self.pairs.tubes)).tolist() for part in (waves.real, waves.imag)
+        )
+        totals = (complex(*total) for total in zip(*parts, strict=True))
+        return [(*ij, *cmath.polar(total)) for ij, total in zip(self.pairs.tubes, totals, strict=True) if total]
 
     def prepare(self, what: Hashable, make: Callable[[ServingModel], T]) -> T:
         """Tables that an output needs of this model, made by ``make`` when first asked for."""
@@ -258,28 +261,15 @@ class ServingModel:
         return residual, change, info
 
 
-def _solved_for(energy: TorsionEnergy) -> NDArray[np.bool_]:
-    """(n,) true for the unknowns below the two highest degrees of their section; constants are always solved for."""
-    parts = []
-    for block in energy.space.blocks:
-        basis = block.basis
+@lru_cache(maxsize=128)
+def _order(given: Unknowns) -> tuple[NDArray[np.int64], int]:
+    """(n + extra,) the unknowns solved for, then those above: the two highest degrees of each section; how many are
+    solved for.  Constants always are."""
+    parts = [np.zeros(0, dtype=bool)]
+    for basis, columns in zip(given.bases, given.columns, strict=True):
         kept = np.arange(basis.degree + 1) <= max(0, basis.degree - FINER)
-        parts.append(np.tile(kept, block.frame.shape[1] * basis.panels))
-    return np.concatenate([np.zeros(0, dtype=bool), *parts])
-
-
-def _weights(energy: TorsionEnergy) -> Array:
-    """(W, n) motion of the tip [m] for the twist of each tube at each Gauss point, times a change of q.
-
-    Twist turns the curvature by |K_j kappa_j| / sum K per angle, which swings what lies beyond: no point farther off
-    than the arc length to the tip.
-    """
-    length = energy.materials.domain.length
-    parts = [np.zeros((0, energy.n))]
-    for node in energy.all_nodes:
-        arm = node.weight * (length - node.s) / node.bending.sum()
-        swing = arm[:, None] * node.bending * np.abs(node.kappa)
-        tubes = np.flatnonzero(swing.any(axis=0))
-        turned = energy.space.angle_map(node.section, node.rule.x)[:, tubes]
-        parts.append((swing[:, tubes, None] * turned).reshape(swing[:, tubes].size, energy.n))
-    return np.concatenate(parts)
+        parts.append(np.tile(kept, (columns.stop - columns.start) // len(kept)))
+    solved = np.concatenate(parts)
+    order = np.argsort(~solved, kind="stable")
+    order.flags.writeable = False
+    return order, int(np.count_nonzero(solved))

@@ -22,9 +22,9 @@ from scipy.integrate import solve_ivp
 
 from ctr_pvs.tube_pair import PairSection
 from ctr_pvs.tube_pair import TubePair
-from ctr_pvs.twist import CONSTANT
 from ctr_pvs.twist import TorqueField
 from ctr_pvs.twist import TwistSpace
+from ctr_pvs.unknowns import CONSTANT
 
 Array = NDArray[np.float64]
 

@@ -23,12 +23,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ctr_pvs.basis import TwistBasis
+from ctr_pvs.lazy import lazy
 from ctr_pvs.materials import Materials
+from ctr_pvs.unknowns import CONSTANT
+from ctr_pvs.unknowns import Unknowns
+from ctr_pvs.unknowns import unknowns
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 
-CONSTANT = TwistBasis(0)
-END = np.ones(1)
 #: Square root of a section's coupling that one panel of polynomials takes on.  Beyond, a twist kink is short against
 #: the section, and polynomials over all of it would pin the kink where nothing holds it.
 BENDS_A_PANEL = 3.5
@@ -104,93 +107,94 @@ class TwistSpace:
     """The unknown twist fields of one domain with polynomials of one degree, or of one for each section.
 
     n : number of unknowns.  Psi is affine in them: psi(s) = alpha + A(s) q.
+    unknowns : what does not depend on the sections' lengths.
+    modes (N, n) : angle [rad/sqrt(J)] of each tube per unknown and per integral of the unknown's function.
     """
 
     def __init__(self, materials: Materials, degree: Degrees) -> None:
         self.materials = materials
         self.degree = degree
-        coupled = np.flatnonzero(materials.coupled)
-        self.first, self.last = (int(coupled[0]), int(coupled[-1])) if len(coupled) else (0, -1)
-        self._lead_compliances: dict[int, Array] = {}
-        self.blocks = self._blocks()
-        self.n = self.blocks[-1].columns.stop if self.blocks else 0
+        made = materials.composition
+        self.first, self.last = made.first, made.last
+        self._leads = self._lead_compliances()
+        lead = self._leads[-1] * made.twisting[self.first] if made.twisting.size else self._leads[:0]
+        self.unknowns = unknowns(made, self._bases(), bool(lead.any()))
+        self.n = self.unknowns.n
+        compliances = np.empty(self.unknowns.twisting.shape)
+        if self.unknowns.lead:
+            compliances[0] = lead
+        lengths = materials.domain.lengths[self.first : self.last + 1, None]
+        np.divide(lengths, self.unknowns.torsional, out=compliances[int(self.unknowns.lead) :])
+        self._scales = np.sqrt(compliances)
+        self._frames = _zero_torque_frames(self._scales, self.unknowns)
+        self.modes = self._columns(self._scales)
+
+    def _bases(self) -> tuple[TwistBasis, ...]:
+        degree = self.degree
+        bases = [CONSTANT] * self.materials.domain.n_sections
+        for m in self.materials.composition.coupled_sections.tolist():
+            panels = panels_needed(self.materials.coupling(m))
+            bases[m] = TwistBasis(degree if isinstance(degree, int) else degree[m], panels)
+        return tuple(bases)
+
+    def _columns(self, scales: Array) -> Array:
+        """(N, n) the frame column of each unknown, times its block's row of ``scales`` (B, N)."""
+        given = self.unknowns
+        return (scales[given.frame_block].T * self._frames).take(given.frame, axis=1)
 
     @property
     def layout(self) -> tuple[object, ...]:
         """Equal for two spaces with the same sections, panels and degrees: their nodes correspond."""
-        return (self.materials.domain.topology, tuple(block.basis for block in self.blocks))
+        return (self.materials.domain.topology, tuple(self.unknowns.bases))
+
+    @lazy
+    def blocks(self) -> list[Block]:
+        given = self.unknowns
+        parts = zip(given.sections, self._scales, given.frame_slices, given.bases, given.columns, strict=True)
+        return [Block(m, scale, self._frames[:, frame], basis, columns) for m, scale, frame, basis, columns in parts]
 
     def basis(self, m: int) -> TwistBasis:
         """The functions that carry the torques of section m: panels where coupling is strong, constants where none
         is."""
-        if not self.materials.coupled[m]:
-            return CONSTANT
-        degree = self.degree if isinstance(self.degree, int) else self.degree[m]
-        return TwistBasis(degree, panels_needed(self.materials.coupling(m)))
+        return self.unknowns.section_bases[m]
 
-    def _twisting(self) -> NDArray[np.bool_]:
-        """(last + 1, N) tubes that carry torque in each section: curved in a coupled section from there on."""
-        pulled = self.materials.curved[: self.last + 1] & self.materials.coupled[: self.last + 1, None]
-        return np.logical_or.accumulate(pulled[::-1], axis=0)[::-1]
-
-    def _blocks(self) -> list[Block]:
-        if self.last < 0:
-            return []
-        twisting = self._twisting()
-        blocks = []
-        lead = np.where(twisting[self.first], self._lead_compliance(self.first), 0.0)
-        if lead.any():
-            blocks.append(self._block(-1, np.sqrt(lead), twisting[self.first], CONSTANT, 0))
-        for m in range(self.first, self.last + 1):
-            stiffness = self.materials.torsional[m]
-            compliance = np.divide(
-                self.materials.domain.lengths[m], stiffness, out=np.zeros_like(stiffness), where=twisting[m]
+    def _lead_compliances(self) -> Array:
+        """(first + 1, N) twist per torque from the tubes' bases to the start of each section of the lead, and of the
+        first one past it [rad/(N m)]."""
+        out = np.empty((self.first + 1, self.materials.robot.n_tubes))
+        out[0] = self.materials.guide_compliance
+        if self.first:
+            np.multiply(
+                self.materials.domain.lengths[: self.first, None],
+                self.materials.composition.softness[: self.first],
+                out=out[1:],
             )
-            start = blocks[-1].columns.stop if blocks else 0
-            blocks.append(self._block(m, np.sqrt(compliance), twisting[m], self.basis(m), start))
-        return blocks
-
-    @staticmethod
-    def _block(section: int, scale: Array, twisting: NDArray[np.bool_], basis: TwistBasis, start: int) -> Block:
-        frame = _zero_torque_frame(scale, twisting)
-        return Block(section, scale, frame, basis, slice(start, start + frame.shape[1] * basis.size))
-
-    def _lead_compliance(self, m: int) -> Array:
-        """(N,) twist per torque from the tubes' bases to the start of section m [rad/(N m)]."""
-        if m not in self._lead_compliances:
-            stiffness = self.materials.torsional[:m]
-            lengths = self.materials.domain.lengths[:m, None]
-            shares = np.divide(lengths, stiffness, out=np.zeros_like(stiffness), where=stiffness > 0.0)
-            self._lead_compliances[m] = self.materials.guide_compliance + shares.sum(axis=0)
-        return self._lead_compliances[m]
+            out.cumsum(axis=0, out=out)
+        return out
 
     def angle_map(self, m: int, x: Array) -> Array:
         """A (g, N, n) [rad/sqrt(J)] at the places ``x`` (g,) in [0, 1] of section m."""
+        if m >= self.first:
+            return self.unknowns.integrals(m, x)[:, None, :] * self.modes
         out = np.zeros((len(x), self.materials.robot.n_tubes, self.n))
-        for block in self.blocks:
-            if block.section > m:
-                break
-            out[:, :, block.columns] = self._block_map(block, m, x)
+        if self.unknowns.lead:
+            columns = self.unknowns.columns[0]
+            out[:, :, columns] = self.lead_share(m, x)[:, :, None] * self.modes[:, columns]
         return out
 
-    def _block_map(self, block: Block, m: int, x: Array) -> Array:
-        """(g or 1, N, columns) of ``angle_map``; 1 where it is the same everywhere."""
-        modes = block.scale[:, None] * block.frame
-        if block.section < 0:
-            if m >= self.first:
-                return modes[None]
-            return self._lead_share(m, x)[:, :, None] * modes
-        # Past its own section a block's twist is complete: the integrals at x = 1.
-        if block.section < m:
-            return (modes[:, :, None] * block.basis.tabulate(END)[1]).reshape(1, len(modes), -1)
-        integrals = block.basis.tabulate(x)[1]
-        return (modes[None, :, :, None] * integrals[:, None, None, :]).reshape(len(x), len(modes), -1)
-
-    def _lead_share(self, m: int, x: Array) -> Array:
-        """(g, N) share of the lead's compliance that lies before the places ``x`` of a section m of the lead."""
-        before, after, whole = (self._lead_compliance(index) for index in (m, m + 1, self.first))
+    def lead_share(self, m: int | Indices, x: Array) -> Array:
+        """(g, N) share of the lead's compliance that lies before the places ``x`` (g,) of a section m of the lead, or
+        of one each (g,)."""
+        before, after, whole = self._leads[m], self._leads[m + 1], self._leads[-1]
         reached = before + x[:, None] * (after - before)
         return np.divide(reached, whole, out=np.zeros_like(reached), where=whole > 0.0)
+
+    def carried(self, q: Array, space: TwistSpace) -> Array:
+        """``coordinates`` of the field of ``q`` in another ``space``."""
+        if space.unknowns is not self.unknowns:
+            return self.coordinates(space.field(q))
+        inverse = np.divide(1.0, space._scales, out=np.zeros_like(space._scales), where=space._scales > 0.0)
+        return (self.modes.T.dot(space._columns(inverse)) * self.unknowns.alike).dot(q)
 
     def field(self, q: Array) -> TorqueField:
         """The torque field of ``q`` (n,)."""
@@ -236,20 +240,19 @@ class TwistSpace:
         return (field.at(start + rule.x * (end - start)) * rule.weights[:, None]).T @ block.basis.tabulate(rule.x)[0]
 
 
-def _zero_torque_frame(scale: Array, twisting: NDArray[np.bool_]) -> Array:
-    """(N, n - 1) orthonormal columns for the n twisting tubes, orthogonal to 1 / scale.
+def _zero_torque_frames(scales: Array, given: Unknowns) -> Array:
+    """(N, F) for the n twisting tubes of each block n - 1 orthonormal columns, orthogonal to 1 / scale.
 
-    A Householder reflection of the last axis: smooth in ``scale``, so that q can be compared between nearby
+    A Householder reflection of the last axis: smooth in ``scales`` (B, N), so that q can be compared between nearby
     commands.  A tube whose base is on the orifice has no compliance there; it is given a vanishing one, and its
     column does nothing.
     """
-    tubes = np.flatnonzero(twisting)
-    relative = scale[tubes] / scale[tubes].max()
-    normal = 1.0 / np.maximum(relative, 1e-9)
-    normal /= np.linalg.norm(normal)
-    mirror = normal.copy()
-    mirror[-1] += 1.0
-    mirror /= np.linalg.norm(mirror)
-    frame = np.zeros((len(scale), len(tubes) - 1))
-    frame[tubes] = (np.eye(len(tubes)) - 2.0 * np.outer(mirror, mirror))[:, :-1]
-    return frame
+    if not given.n:
+        return np.zeros((scales.shape[1], 0))
+    relative = scales / scales.max(axis=1)[:, None]
+    mirrors = given.twisting / np.maximum(relative, 1e-9)
+    mirrors /= np.sqrt((mirrors * mirrors).sum(axis=1))[:, None]
+    mirrors[np.arange(len(mirrors)), given.last_tube] += 1.0
+    mirrors /= np.sqrt((mirrors * mirrors).sum(axis=1))[:, None]
+    images = mirrors[given.frame_block]
+    return given.axes - 2.0 * images.T * mirrors[given.frame_block, given.frame_tube]
