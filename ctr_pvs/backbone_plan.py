@@ -29,6 +29,7 @@ from ctr_pvs.pose_plan import PosePlan
 from ctr_pvs.serving import ServingModel
 
 Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
 
 #: Orders of pieces whose layouts are kept.
 KEPT = 64
@@ -50,8 +51,8 @@ class Layout:
 
     order : kinds of the pieces along the rod, true for an arc.  arcs, bends : the sections of all arcs and all bends.
     x : the places of each section, relative to its length; slices : where they stand among the P.
-    waves, shares, curvatures (W,) : of each wave, the indices in a flat table of places and tubes, in one of sections
-    and tubes, and among the ``curved`` curvatures: those of arcs, then those at the Gauss points.
+    waves, strengths, entries (W,) : of each wave, the indices in a flat table of places and tubes, among the curved
+    tubes of all sections, and in a flat table of waves and curvatures.  curved : number of curvatures, arcs first.
     rows (2 W + 3 A + B,), starts (2 A,) : indices of places and tubes that the rows of ``BackbonePlan.angles`` come
     from, and of what is to be taken off where they are rates.
     """
@@ -65,13 +66,17 @@ class Layout:
         section = [m for m, x in enumerate(self.x) for _ in x]
         arcs = [self.slices[m].start for m in self.arcs]
         points = [place for place, m in enumerate(section) if shapes[m].nodes]
+        curved = [(m, j) for m, shape in enumerate(shapes) for j in shape.tubes]
+        number = {pair: index for index, pair in enumerate(curved)}
         waves = [
-            (place * tubes + j, section[place] * tubes + j, index)
+            (place * tubes + j, number[section[place], j], index)
             for index, place in enumerate(arcs + points)
             for j in shapes[section[place]].tubes
         ]
-        self.waves, self.shares, self.curvatures = np.array(waves, dtype=int).reshape(-1, 3).T.copy()
+        self.waves, self.strengths, curvatures = np.array(waves, dtype=int).reshape(-1, 3).T.copy()
         self.curved = len(arcs) + len(points)
+        self.entries = np.arange(len(waves)) * self.curved + curvatures
+        self.identity = np.eye(tubes)
         # Rates of the roll, then of the curved tube: where there is none, the start is taken off itself.
         rates: list[tuple[int, ...]] = [(place, place + 1, tube) for place in arcs]
         for place, m in zip(arcs, self.arcs, strict=True):
@@ -99,15 +104,14 @@ class BackbonePlan:
     def __init__(self, model: ServingModel, tolerance: float, tube: int) -> None:
         materials = model.energy.materials
         self._relative = tolerance / max(materials.domain.length, tolerance)
-        shares = materials.bending / materials.bending.sum(axis=1, keepdims=True)
-        self._cuts = cuts(model, shares, self._relative)
+        self._cuts = cuts(model, self._relative)
         self._layout = _layout(tuple([cut.shape for cut in self._cuts]), tube, model.tubes)
         self.order = self._layout.order
         self.lengths = [cut.length for cut in self._cuts for _ in range(cut.shape.parts)]
         self._arcs = [(self._cuts[m].length, self._cuts[m].turn) for m in self._layout.arcs]
         self._bends = [(self._cuts[m].length, self._cuts[m].shape.nodes) for m in self._layout.bends]
         self.angles = self._angle_table(model)
-        self.curvature = self._curvature_table(model, shares)
+        self.curvature = self._curvature_table(model)
         self._pose_plans: dict[int, PosePlan | None] = {}
 
     def pieces(self, z: Array) -> list[Piece]:
@@ -143,11 +147,13 @@ class BackbonePlan:
     def _gauss_points(self) -> list[int] | None:
         """Gauss points from which poses on each piece can be interpolated; None if a piece would need too many."""
         out = []
-        for shape, length, _, bend, rate in self._cuts:
-            parts, nodes = (1, shape.nodes) if shape.nodes else nodes_needed(length, bend, rate, 0.0, self._relative)
+        for cut in self._cuts:
+            parts, nodes = 1, cut.shape.nodes
+            if not nodes:
+                parts, nodes = nodes_needed(cut.length, cut.bend, cut.rate, 0.0, self._relative)
             if parts > 1:
                 return None
-            out += [nodes] * shape.parts
+            out += [nodes] * cut.shape.parts
         return out
 
     def _pose_plan(self, count: int, nodes: list[int]) -> PosePlan:
@@ -157,32 +163,36 @@ class BackbonePlan:
 
     def _angle_table(self, model: ServingModel) -> Array:
         """``angles``."""
-        layout, tubes = self._layout, np.arange(model.tubes)
+        layout, n = self._layout, model.n
         maps = np.concatenate([model.energy.space.angle_map(m, x) for m, x in enumerate(layout.x)])
-        psi = np.zeros((len(maps), model.tubes, model.n + model.tubes + 1))
-        psi[:, :, : model.n] = maps[:, :, model.order[: model.n]]
-        psi[:, tubes, model.n + tubes] = 1.0
+        psi = np.zeros((len(maps), model.tubes, n + model.tubes + 1))
+        psi[:, :, :n] = maps[:, :, model.order[:n]]
+        psi[:, :, n:-1] = layout.identity
         rows = psi.reshape(-1, psi.shape[2])
         table = rows[layout.rows]
         waves, arcs = len(layout.waves), len(layout.arcs)
-        table[:waves, -1] += 0.5 * np.pi  # a cosine
-        if arcs:
-            rates = table[2 * waves + arcs : 2 * waves + 3 * arcs]
-            rates -= rows[layout.starts]
-            rates /= np.array([[length + TINY] for length, _ in self._arcs * 2])
+        table[:waves, -1] = 0.5 * np.pi  # a cosine
+        rates = table[2 * waves + arcs : 2 * waves + 3 * arcs]
+        rates -= rows[layout.starts]
+        rates /= np.array([length + TINY for length, _ in self._arcs * 2])[:, None]
         return table
 
-    def _curvature_table(self, model: ServingModel, shares: Array) -> Array:
+    def _curvature_table(self, model: ServingModel) -> Array:
         """``curvature``."""
         layout, materials = self._layout, model.energy.materials
-        boundaries = materials.domain.boundaries.tolist()
-        kappa = np.zeros((layout.slices[-1].stop, model.tubes), dtype=complex)
-        for m, (cut, places, x) in enumerate(zip(self._cuts, layout.slices, layout.x, strict=True)):
-            if cut.shape.tubes:
-                values = materials.pre_curvature(m, x * (cut.length * cut.shape.parts) + boundaries[m])
-                kappa[places] = values * (0.5 * cut.length) if cut.shape.nodes else values
-        moved = kappa.ravel()[layout.waves] * shares.ravel()[layout.shares]
-        count, row = len(moved), np.arange(len(moved))
-        table = np.zeros((2 * count, layout.curved), dtype=complex)
-        table[row, layout.curvatures], table[count + row, layout.curvatures] = moved, 1j * moved
-        return table.view(float)
+        strengths = [
+            0.5 * cut.length * strength if cut.shape.nodes else strength
+            for cut in self._cuts
+            for strength in cut.strengths
+        ]
+        kappa: ComplexArray = np.array(strengths, dtype=complex)[layout.strengths]
+        if any([cut.varies for cut in self._cuts]):
+            law = np.ones((layout.slices[-1].stop, model.tubes), dtype=complex)
+            for m, (cut, places, x) in enumerate(zip(self._cuts, layout.slices, layout.x, strict=True)):
+                if cut.varies:
+                    s = materials.domain.boundaries[m] + materials.domain.lengths[m] * x
+                    law[places] = materials.pre_curvature(m, s)
+            kappa *= law.ravel()[layout.waves]
+        table = np.zeros((2, len(kappa) * layout.curved), dtype=complex)
+        table[0, layout.entries], table[1, layout.entries] = kappa, 1j * kappa
+        return table.reshape(-1, layout.curved).view(float)

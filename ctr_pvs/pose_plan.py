@@ -65,6 +65,12 @@ class Layout:
 _layout = lru_cache(maxsize=KEPT)(Layout)
 
 
+@lru_cache(maxsize=KEPT)
+def _equal_spacing(count: int) -> Array:
+    """(count,) from 0 to 1."""
+    return np.linspace(0.0, 1.0, count)
+
+
 class PosePlan:
     """``count`` poses on pieces of these kinds (true for an arc), ``lengths`` [m] and Gauss points ``nodes``.
 
@@ -85,7 +91,7 @@ class PosePlan:
     ) -> None:
         layout, length = _layout(tuple(order), tuple(nodes)), np.array(lengths)
         boundaries = np.array([0.0, *accumulate(lengths)])
-        self.s = np.linspace(0.0, boundaries[-1], count)
+        self.s = _equal_spacing(count) * boundaries[-1]
         here = boundaries[1:-1].searchsorted(self.s)  # a boundary counts to the piece before it
         x = np.minimum((self.s - boundaries[here]) / (length + TINY)[here], 1.0)
         self.frames, self.integrals = self._interpolators(layout, nodes, x, boundaries)
