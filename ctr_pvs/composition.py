@@ -11,6 +11,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from ctr_pvs.lazy import lazy
 from ctr_pvs.robot import Robot
 from ctr_pvs.robot import Segment
 from ctr_pvs.sections import ABSENT
@@ -30,6 +31,7 @@ class Composition:
     curved_tubes : the pre-curved tubes of each section.  coupled_sections : indices of the coupled ones.
     first, last : the outermost coupled sections, (0, -1) without any.
     twisting (last + 1, N) : tubes that carry torque in each section: curved in a coupled one from there on.
+    size (M, N) : of the pre-curvature [1/m], None unless it is the same all along every segment.
     sections (M,) : all indices.  share (M, N) : K / sum of K.  fastest_turn (M,) : of a pre-curvature [rad/m].
     """
 
@@ -56,6 +58,7 @@ class Composition:
         self.softness = np.divide(1.0, self.torsional, out=np.zeros_like(self.start), where=self.torsional > 0.0)
         self._coefficients = self._pre_curvatures()
         self._spin = 1j * turn if turn.any() else None
+        self.size = np.abs(self._coefficients[0]) if len(self._coefficients) == 1 else None
         sealed(self)
 
     def _segments(self) -> list[tuple[int, int, Segment]]:
@@ -89,6 +92,17 @@ class Composition:
         if self._spin is not None:
             value *= np.exp(self._spin[m] * X)
         return value
+
+    @lazy
+    def constant_stiffest_twist(self) -> Array | None:
+        """``stiffest_twist`` (C,) of the coupled sections where ``size`` tells it."""
+        m = self.coupled_sections
+        return None if self.size is None else self.stiffest_twist(m, self.size[m])
+
+    @lazy
+    def constant_bend(self) -> Array | None:
+        """(1, M) curvature [1/m] if all tubes bent to the same side, where ``size`` tells it."""
+        return None if self.size is None else (self.size * self.share).sum(axis=1)[None]
 
     def stiffest_twist(self, m: NDArray[np.int64], kappa: Array) -> Array:
         """(C,) the most that tubes of curvatures ``kappa`` (C, N) [1/m] in the sections ``m`` (C,) can pull each

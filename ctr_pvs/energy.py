@@ -72,9 +72,10 @@ class TorsionEnergy:
         self.space = TwistSpace(materials, degree)
         self.n = self.space.n
         domain, places = materials.domain, self.space.unknowns.nodes
-        self.s = domain.boundaries[places.section] + domain.lengths[places.section] * places.x
+        lengths = domain.lengths.take(places.section)
+        self.s = domain.boundaries.take(places.section) + lengths * places.x
         self.moment = places.bending * materials.pre_curvature(places.section, self.s)
-        self.coupling = domain.lengths[places.section] * places.share  # quadrature weight over total bending stiffness
+        self.coupling = lengths * places.share  # quadrature weight over total bending stiffness
 
     @lazy
     def angle_map(self) -> Array:

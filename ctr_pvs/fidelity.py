@@ -79,10 +79,12 @@ def _degree(rho: float, motion: float, tolerance: float) -> int:
 
 
 def _glance(materials: Materials) -> tuple[Array, Array]:
-    """(g, M) some places [m] of each section, and the curvature [1/m] there if all tubes bent to the same side."""
+    """(g, M) some places [m] of each section, and the curvature [1/m] there if all tubes bent to the same side, (1, M)
+    where it is constant."""
     domain, made = materials.domain, materials.composition
     s = domain.boundaries[:-1] + gauss_legendre(GLANCE).x[:, None] * domain.lengths
-    return s, (np.abs(materials.pre_curvature(made.sections, s)) * made.share).sum(axis=2)
+    bend = made.constant_bend
+    return s, (np.abs(materials.pre_curvature(made.sections, s)) * made.share).sum(axis=2) if bend is None else bend
 
 
 def _swing(materials: Materials, first: int, s: Array, bend: Array) -> float:

@@ -50,11 +50,12 @@ class Materials:
         strengths = [0.0] * self.domain.n_sections
         sections = self.composition.coupled_sections
         if len(sections):
-            x = FIVE_PLACES[:, None]
-            s = self.domain.boundaries[sections] + self.domain.lengths[sections] * x
-            largest = np.abs(self.pre_curvature(sections, s)).max(axis=0)
-            values = self.domain.lengths[sections] ** 2 * self.composition.stiffest_twist(sections, largest)
-            for m, value in zip(sections.tolist(), values.tolist(), strict=True):
+            lengths = self.domain.lengths.take(sections)
+            most = self.composition.constant_stiffest_twist
+            if most is None:
+                s = self.domain.boundaries.take(sections) + lengths * FIVE_PLACES[:, None]
+                most = self.composition.stiffest_twist(sections, np.abs(self.pre_curvature(sections, s)).max(axis=0))
+            for m, value in zip(sections.tolist(), (lengths**2 * most).tolist(), strict=True):
                 strengths[m] = value
         return strengths
 

@@ -40,11 +40,11 @@ class Pairs:
         self.tubes, self.turns, self._ends = rows.tubes, rows.turns, rows.ends
         self.pair, self.node, self.first, self.second = rows.pair, rows.node, rows.first, rows.second
         #: (R,) amplitude exp(i phase)
-        self.wave = energy.coupling[rows.node] * (
-            energy.moment[rows.node, rows.first].conj() * energy.moment[rows.node, rows.second]
-        )
+        self.wave = energy.moment.take(rows.at_first).conj() * energy.moment.take(rows.at_second)
+        self.wave *= energy.coupling.take(rows.node)
         self.amplitude, self.phase = np.abs(self.wave), np.angle(self.wave)
-        self.map = (rows.integrals * (space.modes[rows.second] - space.modes[rows.first]))[:, order]
+        modes = space.modes.take(rows.second, axis=0) - space.modes.take(rows.first, axis=0)
+        self.map = (rows.integrals * modes)[:, order]
 
     def angles(self, psi: Array) -> Array:
         """theta (R,) [rad] between the turned pre-curvatures, from psi (G, N) at the Gauss points."""
@@ -63,8 +63,10 @@ class Pairs:
 
 
 class _Rows:
-    """What the rows of ``Pairs`` are about, whatever the lengths of sections; integrals (R, n) of the unknowns'
-    functions."""
+    """What the rows of ``Pairs`` are about, whatever the lengths of sections.
+
+    at_first, at_second (R,) : where a table (G, N) has the two tubes.  integrals (R, n) of the unknowns' functions.
+    """
 
     def __init__(self, given: Unknowns) -> None:
         tubes, places = given.composition.bending.shape[1], given.nodes
@@ -73,6 +75,7 @@ class _Rows:
         self.node, self.pair = np.nonzero(curved[:, first] & curved[:, second])
         self.tubes = list(zip(first.tolist(), second.tolist(), strict=True))
         self.first, self.second = first[self.pair], second[self.pair]
+        self.at_first, self.at_second = self.node * tubes + self.first, self.node * tubes + self.second
         self.integrals = places.integrals[self.node]
         self.turns = np.zeros((len(self.node), tubes))
         row = np.arange(len(self.node))
@@ -111,11 +114,11 @@ class PackedForm:
         self.sides = 1 + self.turns.shape[1]
         self._column, self._row, self._diagonal = _packed(n)
         rows = len(pairs.amplitude)
-        self.map = np.ascontiguousarray(pairs.map[:, :n])
+        self._map = np.ascontiguousarray(pairs.map.T[:n])
         entries = (self.size + n * self.sides) * (2 * rows + 2)
         self._table = self._tabulate() if entries <= LARGEST_TABLE else None
         if self._table is None:
-            self._convex = self._pack((self.map.T * pairs.amplitude) @ self.map)
+            self._convex = self._pack((self._map * pairs.amplitude) @ self._map.T)
             self._one = self._pack(np.eye(n))
 
     def _pack(self, matrix: Array) -> Array:
@@ -123,10 +126,11 @@ class PackedForm:
 
     def _tabulate(self) -> Array:
         size, n, rows = self.size, self.n, len(self.pairs.amplitude)
-        across = np.ascontiguousarray(self.map.T)
-        scaled = across * self.pairs.amplitude
+        scaled = self._map * self.pairs.amplitude
         table = np.zeros((size + n * self.sides, 2 * rows + 2))
-        products = np.multiply(scaled.take(self._column, axis=0), across.take(self._row, axis=0), table[:size, :rows])
+        products = np.multiply(
+            scaled.take(self._column, axis=0), self._map.take(self._row, axis=0), table[:size, :rows]
+        )
         table[:size, -2] = self._diagonal
         np.negative(products.sum(axis=1), table[:size, -1])
         table[size : size + n, rows:-2] = scaled
@@ -145,10 +149,10 @@ class PackedForm:
         rows = len(self.pairs.amplitude)
         weighted = self.pairs.amplitude * sines[:rows]
         out = np.empty(self.size + self.sides * self.n)
-        out[: self.size] = self._pack((self.map.T * weighted).dot(self.map)) + self._one - sines[-1] * self._convex
+        out[: self.size] = self._pack((self._map * weighted).dot(self._map.T)) + self._one - sines[-1] * self._convex
         sides = out[self.size :].reshape(self.sides, self.n)
-        sides[0] = self.map.T.dot(self.pairs.amplitude * sines[rows : 2 * rows])
-        sides[1:] = (self.turns.T * weighted).dot(self.map)
+        sides[0] = self._map.dot(self.pairs.amplitude * sines[rows : 2 * rows])
+        sides[1:] = (self.turns.T * weighted).dot(self._map.T)
         return out
 
     def unpacked(self, sines: Array) -> Array:

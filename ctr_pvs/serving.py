@@ -108,12 +108,13 @@ class ServingModel:
         self.waves = self.pairs.waves(self.n)
         self.check_form = PackedForm(self.pairs, self.finer, tangents=False)
         self.form = PackedForm(self.pairs, self.n, tangents=True)
-        self.weights = tip_weights(energy).take(self.order, axis=1)
+        self.weights = tip_weights(energy)[:, self.order]
         squares = energy.space.unknowns.nodes.squares.dot((energy.space.modes**2).T)
         self.twist_norm = math.sqrt(squares.max(initial=0.0))
         self.tubes = energy.materials.robot.n_tubes
         self.no_answers = np.zeros((self.tubes, self.n))
         self._prepared: dict[Hashable, Any] = {}
+        self._first_twist = self._twist_at_first_order()
 
     @lazy
     def tip_shares(self) -> Array:
@@ -127,15 +128,15 @@ class ServingModel:
         shares[: self.n] = 1.0
         return shares
 
-    @lazy
-    def _first_twist(self) -> list[tuple[int, int, float, float]]:
+    def _twist_at_first_order(self) -> list[tuple[int, int, float, float]]:
         """Per pair of tubes: strength [m] and phase of the sine that tells how far twist moves the tip at first order.
 
         The twist that torsional stiffness alone would hold, as if the coupling held it as much as it can at best: so
         that rather too many states are looked at again.
         """
-        strength = np.abs(self.weights[:, : self.n].dot(self.form.map.T)).sum(axis=0)
-        stiffest = 1.0 + float(self.pairs.amplitude.dot((self.form.map**2).sum(axis=1)))
+        turned = self.pairs.map[:, : self.n].T
+        strength = np.abs(self.weights[:, : self.n].dot(turned)).sum(axis=0)
+        stiffest = 1.0 + float((turned * turned).dot(self.pairs.amplitude).sum())
         waves = self.pairs.wave * (strength / stiffest)
         parts = (
             np.bincount(self.pairs.pair, part, len(self.pairs.tubes)).tolist() for part in (waves.real, waves.imag)

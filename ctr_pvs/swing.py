@@ -27,33 +27,35 @@ def tip_weights(energy: TorsionEnergy) -> Array:
     the backbone."""
     space = energy.space
     swung = _swung(space.unknowns)
-    swings = _swings(energy, swung).ravel()[swung.kept]
-    return swings[:, None] * swung.integrals * space.modes[swung.tube]
+    swings = _swings(energy, swung).take(swung.kept)
+    return swings[:, None] * swung.integrals * space.modes.take(swung.tube, axis=0)
 
 
 def _swings(energy: TorsionEnergy, swung: _Swung) -> Array:
     """(rows, N) motion of the tip [m] for a twist [rad] of each tube: at every coupled and every other place between
     coupled sections, and all before them and all past them together."""
     domain, plain = energy.materials.domain, swung.plain
-    length, lengths = domain.length, domain.lengths[plain.section]
+    length, lengths = domain.length, domain.lengths.take(plain.section)
     coupled = (energy.coupling * (length - energy.s))[:, None] * np.abs(energy.moment)
     if not len(plain.x):
         return coupled
-    s = domain.boundaries[plain.section] + lengths * plain.x
-    others = np.abs(energy.materials.pre_curvature(plain.section, s)) * plain.bending
-    others *= (lengths * plain.share * (length - s))[:, None]
+    s = domain.boundaries.take(plain.section) + lengths * plain.x
+    others = swung.moment
+    if others is None:
+        others = np.abs(energy.materials.pre_curvature(plain.section, s)) * plain.bending
+    others = others * (lengths * plain.share * (length - s))[:, None]
     before, past = swung.before, swung.past
     if before:
         others[:before] *= energy.space.lead_share(plain.section[:before], plain.x[:before])
-    ends = others[:before].sum(axis=0), others[past:].sum(axis=0)
-    return np.concatenate((coupled, others[before:past], ends[0][None], ends[1][None]))
+    first, last = others[:before].sum(axis=0), others[past:].sum(axis=0)
+    return np.concatenate((coupled, others[before:past], first[None], last[None]))
 
 
 class _Swung:
     """Where twist swings the tip, whatever the lengths of sections.
 
     plain : places of pre-curved sections without coupling; ``before`` of them lie before the first coupled one, those
-    from ``past`` on beyond the last.
+    from ``past`` on beyond the last.  moment (places, N) : size of K kappa* there [N m] if lengths do not change it.
     kept, tube (W,) : the entries of ``_swings`` that can differ from zero, and their tubes; integrals (W, n) of the
     unknowns' functions there.
     """
@@ -63,6 +65,7 @@ class _Swung:
         sections = np.flatnonzero(made.curved.any(axis=1) & ~made.coupled).tolist() if given.n else []
         self.plain = Places(given, [(m, rule) for m in sections])
         section = self.plain.section
+        self.moment = None if made.size is None else self.plain.bending * made.size[section]
         self.before, self.past = (int(index) for index in np.searchsorted(section, (made.first, made.last)))
         between = slice(self.before, self.past)
         curved, integrals = made.curved[section], self.plain.integrals

@@ -140,7 +140,7 @@ class TwistSpace:
     def _columns(self, scales: Array) -> Array:
         """(N, n) the frame column of each unknown, times its block's row of ``scales`` (B, N)."""
         given = self.unknowns
-        return (scales[given.frame_block].T * self._frames).take(given.frame, axis=1)
+        return (scales.take(given.frame_block, axis=0).T * self._frames).take(given.frame, axis=1)
 
     @property
     def layout(self) -> tuple[object, ...]:
@@ -249,10 +249,10 @@ def _zero_torque_frames(scales: Array, given: Unknowns) -> Array:
     """
     if not given.n:
         return np.zeros((scales.shape[1], 0))
-    relative = scales / scales.max(axis=1)[:, None]
-    mirrors = given.twisting / np.maximum(relative, 1e-9)
-    mirrors /= np.sqrt((mirrors * mirrors).sum(axis=1))[:, None]
-    mirrors[np.arange(len(mirrors)), given.last_tube] += 1.0
-    mirrors /= np.sqrt((mirrors * mirrors).sum(axis=1))[:, None]
-    images = mirrors[given.frame_block]
-    return given.axes - 2.0 * images.T * mirrors[given.frame_block, given.frame_tube]
+    relative = scales / np.maximum.reduce(scales, axis=1)[:, None]
+    normals = given.twisting / np.maximum(relative, 1e-9)
+    normals /= np.sqrt((normals * normals).sum(axis=1))[:, None]
+    mirrors = normals + given.last_axes
+    # Of a mirror half the square is its last component, as normals are unit vectors.
+    shares = normals.take(given.frame_tube) / mirrors.take(given.frame_last)
+    return given.axes - mirrors.take(given.frame_block, axis=0).T * shares

@@ -28,8 +28,9 @@ class Unknowns:
     """n unknowns in B blocks with F columns of frames together.
 
     sections, bases : of each block; -1 for the lead.  columns : where its unknowns are.
-    twisting (B, N) : tubes that twist in the block.  last_tube (B,) : the last one of them.
-    frame_block, frame_tube (F,) : block of each frame column, and the tube that it stands for.
+    twisting (B, N) : tubes that twist in the block.  last_axes (B, N) : 1 for the last one of them.
+    frame_block (F,) : block of each frame column.  frame_tube, frame_last (F,) : where a table (B, N) has the tube that
+    the column stands for, and the last one of the block.  axes (N, F) : unit vectors of the former.
     frame (n,) : frame column of each unknown.
     """
 
@@ -40,7 +41,6 @@ class Unknowns:
         self.bases = [CONSTANT if m < 0 else bases[m] for m in self.sections]
         tubes = [np.flatnonzero(made.twisting[max(m, made.first)]).tolist() for m in self.sections]
         self.twisting = made.twisting[[max(m, made.first) for m in self.sections]]
-        self.last_tube = np.array([twisting[-1] for twisting in tubes], dtype=np.int64)
         #: (last + 1 - first, N) torsional stiffness [N m^2], without end where a tube does not twist
         self.torsional = np.where(made.twisting, made.torsional[: made.last + 1], np.inf)[made.first :]
         blocks: list[int] = []
@@ -56,16 +56,16 @@ class Unknowns:
                 frame_tubes.append(tube)
             self.frame_slices.append(slice(first, len(blocks)))
             self.columns.append(slice(start, len(frames)))
-        self.frame_block, self.frame_tube, self.frame = (
+        self.frame_block, stands_for, self.frame = (
             np.array(index, dtype=np.int64) for index in (blocks, frame_tubes, frames)
         )
+        count = self.twisting.shape[1]
+        last = np.array([twisting[-1] for twisting in tubes], dtype=np.int64)
+        self.last_axes, self.axes = np.eye(count)[last], np.eye(count)[:, stands_for]
+        self.frame_tube = self.frame_block * count + stands_for
+        self.frame_last = self.frame_block * count + last[self.frame_block]
         self.n = len(frames)
         sealed(self)
-
-    @lazy
-    def axes(self) -> Array:
-        """(N, F) unit vectors of the tubes that the frame columns stand for."""
-        return np.eye(self.twisting.shape[1])[:, self.frame_tube]
 
     @lazy
     def alike(self) -> Array:
