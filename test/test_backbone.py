@@ -79,6 +79,23 @@ def test_poses_along_the_backbone():
         answer.backbone(1)
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_moving_the_bases_keeps_the_poses_right(seed):
+    """Tables are kept from base position to base position: of the same order of pieces, of others, and back again;
+    against pieces of the shape itself."""
+    rng = np.random.default_rng(seed)
+    robot = random_robot(rng, 2 + seed % 2)
+    solver, D, other = EquilibriumSolver(robot, tolerance=1e-8), random_D(rng, robot), random_D(rng, robot)
+    for place in (D, D + 1e-4, other, D + 2e-4, other - 1e-4, D):
+        answer = solver.solve(rng.uniform(-1, 1, robot.n_tubes), place)
+        assert answer.success
+        found = answer.backbone(40)
+        expected = poses(answer.shape.pieces(1e-10, answer.shape.leader), found.s)
+        assert found.position == pytest.approx(expected.position, abs=2e-8)
+        assert found.orientation == pytest.approx(expected.orientation, abs=1e-6)
+        assert answer.tip.position == pytest.approx(expected.position[-1], abs=1e-8)
+
+
 def test_each_tube_has_its_own_roll():
     """Tube poses share the backbone's points and tangents; they differ by the tubes' twist, and end at their own
     tips."""

@@ -21,6 +21,7 @@ from ctr_pvs.backbone import tip_pose
 from ctr_pvs.basis import gauss_legendre
 from ctr_pvs.collocation import FEWEST_NODES
 from ctr_pvs.collocation import MOST_NODES
+from ctr_pvs.collocation import interpolation
 from ctr_pvs.collocation import nodes_needed
 from ctr_pvs.pieces import Arc
 from ctr_pvs.pieces import Bend
@@ -223,3 +224,15 @@ def test_quaternions_are_continuous_and_of_norm_one():
             assert np.sum(orientation * before, axis=1).min() > 0.99
         before = orientation
     assert before == pytest.approx(-poses(rod(0.0), s).orientation, abs=1e-13)
+
+
+@pytest.mark.parametrize("nodes", [1, FEWEST_NODES, 9, MOST_NODES])
+def test_interpolation_from_gauss_points(nodes):
+    """Exact for polynomials of degree G - 1 and their integrals, and no integral at 0 to the last bit."""
+    rng = np.random.default_rng(nodes)
+    x = np.concatenate([[0.0, 1.0], rng.uniform(0.0, 1.0, 50)])
+    law = np.polynomial.Chebyshev(rng.uniform(-1.0, 1.0, nodes), domain=[0.0, 1.0])
+    values, integrals = interpolation(nodes, x)
+    assert values @ law(gauss_legendre(nodes).x) == pytest.approx(law(x), abs=1e-12)
+    assert integrals @ law(gauss_legendre(nodes).x) == pytest.approx(law.integ(lbnd=0.0)(x), abs=1e-14)
+    assert not integrals[0].any()
