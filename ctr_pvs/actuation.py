@@ -20,8 +20,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +27,7 @@ from numpy.typing import NDArray
 from ctr_pvs.energy import SectionNodes
 from ctr_pvs.energy import bending_density
 from ctr_pvs.energy import shared_curvature
+from ctr_pvs.materials import Materials
 from ctr_pvs.robot import Segment
 from ctr_pvs.sections import ABSENT
 from ctr_pvs.sections import Domain
@@ -57,11 +56,60 @@ class Loads:
 
 def virtual_work_loads(shape: Shape, nodes: Sequence[SectionNodes]) -> Loads:
     """The loads of an equilibrium ``shape``, exact derivatives of the energy that is sampled at ``nodes``."""
-    rates = _SectionRates(shape, nodes)
-    minus, plus = (rates.slide.sum(axis=0) + boundary_forces(shape.domain, rates, side) for side in (-1, 1))
-    kink = shape.domain.kinked_tubes()
-    minus[~kink] = plus[~kink]
-    return Loads(-rates.torque[0], plus, np.column_stack([minus, plus]), kink)
+    rates, kink = _SectionRates(shape, nodes), shape.domain.kinked_tubes()
+    plus = [rates.force(Motion(shape.domain, tube, 1)) for tube in range(len(kink))]
+    minus = [rates.force(Motion(shape.domain, tube, -1)) if kink[tube] else plus[tube] for tube in range(len(kink))]
+    return Loads(-rates.torque[0], np.array(plus), np.column_stack([minus, plus]), kink)
+
+
+class Motion:
+    """What dD of one tube moves towards one side (+1, -1), besides the tube's material; M sections of N tubes.
+
+    far, near : (M) per dD, how every section's far and near end move: -1 where it rides on the tube, else 0.
+    opens : boundary and segments (N) of the thin sections that grow by ``side`` dD.  They hold the materials of the
+        section that is shortened, but for the tube's own.
+    guided : the tube's segment that goes into the guide; ``ABSENT`` where its tip is on the orifice.
+    """
+
+    def __init__(self, domain: Domain, tube: int, side: int) -> None:
+        self.tube, self.side = tube, side
+        self.far, self.near = [0.0] * domain.n_sections, [0.0] * domain.n_sections
+        self.opens: list[tuple[int, list[int]]] = []
+        guided = int(domain.guide_segment[tube])
+        self.guided = 0 if guided == ABSENT else guided  # with its base on the orifice the first segment goes in
+        for index, events in enumerate(domain.events):
+            for event in events:
+                if event.tube == tube:
+                    self._ride(domain, index, event, index == 0 or len(events) > 1)
+
+    def _ride(self, domain: Domain, index: int, event: Event, kink: bool) -> None:
+        """Towards +D an event moves back and shortens the section before; towards -D it moves on and shortens the one
+        after.  Without a kink it does both to both; on the orifice it goes into the guide."""
+        if index == 0 and self.side > 0:
+            self.guided = event.after
+            return
+        if self.side > 0 or not kink:
+            self.far[index - 1] = -1.0
+        if (self.side < 0 or not kink) and index < domain.n_sections:
+            self.near[index] = -1.0
+        if kink:
+            self.opens.append((index, self._between(domain, index, event)))
+
+    def _between(self, domain: Domain, index: int, event: Event) -> list[int]:
+        """Segments (N) between ``event`` and what else is on boundary ``index``."""
+        shortened = index if self.side < 0 else index - 1
+        segments = domain.segment[shortened].tolist() if shortened < domain.n_sections else [ABSENT] * len(domain.D)
+        segments[event.tube] = event.before if self.side < 0 else event.after
+        return segments
+
+
+def pre_curvature_at(materials: Materials, tube: int, segment: int, boundary: int) -> complex:
+    """kappa* [1/m] of a tube's segment where it lies on ``boundary``."""
+    material, domain = materials.robot.tubes[tube], materials.domain
+    if material.segments[segment].is_straight:
+        return 0j
+    place = domain.boundaries[boundary] + domain.D[tube] - material.breaks[segment]
+    return complex(material.segments[segment].pre_curvature(place))
 
 
 class _SectionRates:
@@ -119,95 +167,37 @@ class _SectionRates:
         turned_beyond = (shape.angle_at_boundaries[m + 1] - shape.angle_at_boundaries[m]) / shape.domain.lengths[m]
         return rate + float(np.sum(pull * turned)) - float(turned_beyond @ self.torque[m + 1])
 
-    def thin(self, index: int, segments: NDArray[np.int64]) -> float:
-        robot, domain = self.shape.materials.robot, self.shape.domain
-        psi = self.shape.angle_at_boundaries[index]
+    def force(self, motion: Motion) -> float:
+        """dE/dD_j [N] along ``motion``."""
+        out = float(self.slide[:, motion.tube].sum() + self.right @ motion.far + self.left @ motion.near)
+        if motion.guided != ABSENT:
+            out += self._guide(motion.tube, motion.guided)
+        return out + motion.side * sum(self._thin(boundary, segments) for boundary, segments in motion.opens)
+
+    def _thin(self, boundary: int, segments: list[int]) -> float:
+        """Energy per length [N] of a vanishing section at ``boundary`` with one of ``segments`` (N) per tube: bending
+        density less the work T^2 / (2 GJ) that the passing torques do in twisting it."""
+        materials, psi = self.shape.materials, self.shape.angle_at_boundaries[boundary]
         bending, kappa = np.zeros(len(psi)), np.zeros(len(psi), dtype=complex)
         twisting = 0.0
-        for tube in np.flatnonzero(segments != ABSENT):
-            segment = robot.tubes[tube].segments[segments[tube]]
-            start = robot.tubes[tube].breaks[segments[tube]]
-            bending[tube] = segment.bending_stiffness
-            kappa[tube] = segment.pre_curvature(np.array(domain.boundaries[index] + domain.D[tube] - start))
-            twisting += self._twisting(float(self.torque[index, tube]), segment)
+        for tube, index in enumerate(segments):
+            if index != ABSENT:
+                segment = materials.segment(tube, index)
+                bending[tube] = segment.bending_stiffness
+                kappa[tube] = pre_curvature_at(materials, tube, index, boundary)
+                twisting += self._twisting(float(self.torque[boundary, tube]), segment)
         if not bending.any():
             return 0.0
         k = shared_curvature(bending, bending * kappa * np.exp(1j * psi))
         return float(bending_density(bending, kappa, psi, k)) - twisting
 
-    def guide(self, tube: int, segment: int) -> float:
-        material = self.shape.materials.robot.tubes[tube]
-        guided = material.segments[segment]
-        kappa = guided.pre_curvature(np.array(self.shape.domain.D[tube] - material.breaks[segment]))
-        straightening = 0.5 * guided.bending_stiffness * float(np.abs(kappa)) ** 2
+    def _guide(self, tube: int, index: int) -> float:
+        """Energy [N] per dD_j of guiding more of a tube's segment: straightening it, less the work of its torque."""
+        guided = self.shape.materials.segment(tube, index)
+        kappa = pre_curvature_at(self.shape.materials, tube, index, 0)
+        straightening = 0.5 * guided.bending_stiffness * abs(kappa) ** 2
         return straightening - self._twisting(float(self.torque[0, tube]), guided)
 
     def _twisting(self, torque: float, segment: Segment) -> float:
         """Work per length [N] that a constant torque does in twisting a segment beyond its stored energy."""
         return 0.5 * torque**2 / segment.torsional_stiffness if self.shape.twists else 0.0
-
-
-class Rates(Protocol):
-    """Energy per motion of section ends [N], as numbers or as rows of coefficients (C,) that give numbers later.
-
-    right, left : (M, ...) per motion of a section's far and near end.
-    """
-
-    right: Array
-    left: Array
-
-    def thin(self, index: int, segments: NDArray[np.int64]) -> Any:
-        """Energy per length of a vanishing section at boundary ``index`` with one of ``segments`` (N,) per tube:
-        bending density less the work T^2 / (2 GJ) that the passing torques do in twisting it."""
-
-    def guide(self, tube: int, segment: int) -> Any:
-        """Energy per dD_j of guiding more of a tube's ``segment``: straightening it, less the work of its torque in
-        twisting it."""
-
-
-def boundary_forces(domain: Domain, rates: Rates, side: int) -> Array:
-    """(N, ...) part of dE/dD_j towards ``side`` (+1, -1) from the section ends that ride on tube j, and the guide."""
-    force = np.zeros((len(domain.D), *rates.right.shape[1:]))
-    for tube in range(len(domain.D)):
-        segment = _guided_segment(domain, tube, side)
-        if segment != ABSENT:  # its tip is on the orifice: nothing is left to go in
-            force[tube] = rates.guide(tube, segment)
-    for index, events in enumerate(domain.events):
-        for event in events:
-            if index == 0 and side < 0:
-                force[event.tube] -= _opening(domain, rates, 0, event, side)
-            elif index > 0 and len(events) > 1:
-                force[event.tube] -= _opening(domain, rates, index, event, side)
-            elif index > 0:
-                force[event.tube] -= rates.right[index - 1] + _left_rate(rates, index)
-    return force
-
-
-def _guided_segment(domain: Domain, tube: int, side: int) -> int:
-    """The segment that goes into the guide with dD_j towards ``side``; ``ABSENT`` where none is left."""
-    on_orifice = [event.after for event in domain.events[0] if event.tube == tube]
-    if side > 0 and on_orifice:
-        return on_orifice[0]
-    index = int(domain.guide_segment[tube])
-    return 0 if index == ABSENT else index  # with its base on the orifice the first segment goes in
-
-
-def _left_rate(rates: Rates, index: int) -> Any:
-    """Energy per motion of boundary ``index`` as the near end of the section after it; past the last there is none."""
-    return rates.left[index] if index < len(rates.left) else 0.0
-
-
-def _opening(domain: Domain, rates: Rates, index: int, event: Event, side: int) -> Any:
-    """Energy per motion of ``event`` along s when it parts from what else is on boundary ``index``.
-
-    Towards +D the event moves back and shortens the section before; towards -D it moves on and shortens the one
-    after.  The thin section between holds the materials of the other side, but for the event's own tube.
-    """
-    if side > 0:
-        segments = domain.segment[index - 1].copy()
-        segments[event.tube] = event.after
-        return rates.right[index - 1] - rates.thin(index, segments)
-    beyond = np.full(len(domain.D), ABSENT)
-    segments = (domain.segment[index] if index < domain.n_sections else beyond).copy()
-    segments[event.tube] = event.before
-    return _left_rate(rates, index) + rates.thin(index, segments)

@@ -11,11 +11,13 @@ pass the orifice, and the second term is the sum of T_j^2 / (2 GJ_j).  With b_j 
 
     w = sum |b_j|^2 (1 / K_j - 1 / sum K) / 2  -  sum over pairs Re[conj(b_i) b_j] / sum K,
 
-so all of it is linear in cosines and sines of psi_j - psi_i and in squares of torques and unknowns:
+whose pairs are the cosines of ``Pairs``.  Of the rate of ln(conj(b_i) b_j h) with D the real part makes a term grow,
+the imaginary part turns its angle.  So all of it is linear in cosines and sines of those angles and in squares of
+torques and unknowns:
 
     loads = linear . [cos, sin, 1]  +  squared . [T^2, q^2],      T = torques . [cos, sin, 1].
 
-Which rates make up the force on each tube, and why it has two sides at a kink, is told in ``actuation``.
+Which motions make up the force on each tube, and why it has two sides at a kink, is told in ``actuation``.
 """
 
 from __future__ import annotations
@@ -27,42 +29,34 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ctr_pvs.actuation import Loads
-from ctr_pvs.actuation import boundary_forces
+from ctr_pvs.actuation import Motion
+from ctr_pvs.actuation import pre_curvature_at
 from ctr_pvs.robot import Segment
 from ctr_pvs.sections import ABSENT
-from ctr_pvs.sections import Domain
 from ctr_pvs.serving import ServingModel
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
-Indices = NDArray[np.int64]
 
 
 class PreparedLoads:
     """Loads and energy of every equilibrium of ``model``, from its z (n + N + 1,) as ``Served`` has it."""
 
     def __init__(self, model: ServingModel) -> None:
-        rows = _Rows(model)
-        self.tubes, self._n, self._energy = model.tubes, model.n, model.energy  # not the model, which may keep this
-        self.kink = rows.domain.kinked_tubes()
+        tubes, domain = model.tubes, model.energy.materials.domain
+        self.tubes, self._n, self._energy = tubes, model.n, model.energy  # not the model, which may keep this
+        self.kink = domain.kinked_tubes()
         self.kink.flags.writeable = False  # shared by all answers
-        kinked = np.flatnonzero(self.kink)
-        outputs = np.concatenate([-rows.torque[0], rows.forces(1), rows.forces(-1)[kinked]])
+        kinked = [tube for tube, kink in enumerate(self.kink.tolist()) if kink]
         # Both sides are taken from one number where there is no kink, and so are equal to the last bit.
-        self._sides = np.repeat(np.arange(self.tubes, 2 * self.tubes)[:, None], 2, axis=1)
-        self._sides[kinked, 0] = 2 * self.tubes + np.arange(len(kinked))
-        split, squares = rows.angles.one + 1, rows.angles.one + 1 + len(rows.passing)
-        passing = np.flatnonzero(outputs[:, split:squares].any(axis=0))
-        linear = np.concatenate([outputs[:, :split], rows.passing[passing, :split]])
-        kept = np.flatnonzero(linear.any(axis=0) | (rows.bending != 0.0))
-        self._size = len(outputs)
-        self._waves = rows.angles.waves()[kept]
-        self._linear = linear[:, kept]
-        self._bending = rows.bending[kept]
-        # Columns for all rows of ``linear`` and all of z, so that nothing need be cut out of them.
-        self._squared = np.zeros((len(outputs), len(linear) + model.n + model.tubes + 1))
-        self._squared[:, len(outputs) : len(linear)] = outputs[:, split + passing]
-        self._squared[:, len(linear) : len(linear) + model.n] = outputs[:, squares:]
+        minus = {tube: 2 * tubes + place for place, tube in enumerate(kinked)}
+        self._sides = np.array([[minus.get(tube, tubes + tube), tubes + tube] for tube in range(tubes)])
+        motions = [Motion(domain, tube, 1) for tube in range(tubes)] + [Motion(domain, tube, -1) for tube in kinked]
+        self._size = tubes + len(motions)
+        rates = _Rates(model, motions)
+        self._waves = _waves(model, list(rates.beside))
+        self._linear, self._bending = _linear(model, rates, len(self._waves))
+        self._squared = _squared(model, rates, len(self._linear))
 
     def loads(self, z: Array, twists: bool = True) -> Loads:
         """The loads at the equilibrium ``z``, those of ``actuation.virtual_work_loads`` up to its residual.
@@ -88,202 +82,185 @@ class PreparedLoads:
         return self._energy.constant()
 
 
-class _Angles:
-    """Differences psi_second - psi_first (P,) of two tubes' angles wherever a load depends on one.
+class _Rates:
+    """dE/dD [N] along F ``motions`` of the N tubes of ``model``, by what it is to be multiplied with.
 
-    First come all nodes where two curved tubes overlap, then every pair at each boundary with a kink.
-
-    node : (p,) index of the node, for the p first of them.  columns : per boundary and pair of tubes the place in P.
-    one : where the 1 is that follows P cosines and P sines.
+    one : (F,) with 1.
+    growth : (F, R) with the model's R terms -amplitude exp(i theta): the rates [1/m] of their logarithms.
+    beside : (F,) complex, with exp(i (psi_second - psi_first)) at angles that are not among those of the model: by
+        section, x, first and second tube.
+    twisting : (F) with the squared torque that passes a boundary: by boundary and tube.
+    lengthening : (F, M) rates [1/m] of the logarithms of the sections' lengths.
+    section : (G,) of each node.  stored : (G, N) bending energy [J] there of each tube without the others.
     """
 
-    def __init__(self, model: ServingModel, sections: Indices, kinks: list[int]) -> None:
-        energy, n = model.energy, model.n
-        pairs = list(itertools.combinations(range(model.tubes), 2))
-        every = np.array(pairs, dtype=np.int64).reshape(-1, 2)
-        curved = energy.materials.curved[sections]
-        self.node, pair = np.nonzero(curved[:, every[:, 0]] & curved[:, every[:, 1]])
-        self.first, self.second = every[pair].T
-        self.columns: dict[tuple[int, int, int], int] = {}
-        unknowns = model.order[:n]
-        at_nodes = energy.angle_map[:, :, unknowns]
-        maps = [at_nodes[self.node, self.second] - at_nodes[self.node, self.first]]
-        for index in kinks:
-            start = len(self.node) + len(self.columns)
-            self.columns.update({(index, *ij): start + row for row, ij in enumerate(pairs)})
-            here = _boundary_map(model, index)[:, unknowns]
-            maps.append(here[every[:, 1]] - here[every[:, 0]])
-        self.map = np.concatenate(maps)
-        self.turns = np.zeros((len(self.map), model.tubes))
-        ends = np.concatenate([every[pair], np.tile(every, (len(kinks), 1))])
-        row = np.arange(len(ends))
-        self.turns[row, ends[:, 0]] = -1.0
-        self.turns[row, ends[:, 1]] = 1.0
-        self.one = 2 * len(self.map)
-
-    def waves(self) -> Array:
-        """(2 P + 1, n + N + 1): maps (q, alpha, 1) to the angles whose sines are the cosines, the sines and 1."""
-        differences = np.column_stack([self.map, self.turns, np.zeros(len(self.map))])
-        waves = np.concatenate([differences, differences, np.zeros((1, differences.shape[1]))])
-        waves[: len(differences), -1] = 0.5 * np.pi
-        waves[-1, -1] = 0.5 * np.pi
-        return waves
-
-
-def _boundary_map(model: ServingModel, index: int) -> Array:
-    """(N, finer n) change of psi at boundary ``index`` with the unknowns."""
-    space, sections = model.energy.space, model.energy.materials.domain.n_sections
-    if not model.finer:
-        return np.zeros((model.tubes, 0))
-    section = min(index, sections - 1)
-    return space.angle_map(section, np.array([float(index - section)]))[0]
-
-
-class _Rows:
-    """The rates of ``actuation`` as rows of coefficients (C,): P cosines, P sines, 1, squared torques and unknowns.
-
-    right, left : (M, C) [N] per motion of a section's far and near end.  slide : (N, C) [N] per slide of each tube's
-    material under fixed ends.  torque : (N, C) [N m] by boundary, the orifice and those with kinks; passing : the same
-    in one table, in the order of their squares.  bending : (2 P + 1,) bending energy [J] that depends on q.
-    """
-
-    def __init__(self, model: ServingModel) -> None:
-        self.model, self.energy = model, model.energy
-        self.materials = model.energy.materials
-        self.domain: Domain = self.materials.domain
-        kinks = [index for index, events in enumerate(self.domain.events) if len(events) > (index > 0)]
-        sections = [np.full(len(node.s), node.section) for node in self.energy.nodes]
-        self.section = np.concatenate([np.zeros(0, dtype=np.int64), *sections])
-        self.angles = _Angles(model, self.section, kinks)
-        self.boundaries = sorted({0, *kinks})
-        self.size = self.angles.one + 1 + len(self.boundaries) * model.tubes + model.n
-        self.right = np.zeros((self.domain.n_sections, self.size))
-        self.left = np.zeros_like(self.right)
-        self.slide = np.zeros((model.tubes, self.size))
-        self.bending = np.zeros(self.angles.one + 1)
+    def __init__(self, model: ServingModel, motions: list[Motion]) -> None:
+        self._model, self._energy, self.motions = model, model.energy, motions
+        self._materials = model.energy.materials
+        ends = np.array([(motion.near, motion.far) for motion in motions])
+        self._near, self._stretch = ends[:, 0], ends[:, 1] - ends[:, 0]
+        self.lengthening = self._stretch / self._materials.domain.lengths
+        self.beside: dict[tuple[int, float, int, int], ComplexArray] = {}
+        self.twisting: dict[tuple[int, int], list[float]] = {}
+        self._kappa = np.empty_like(self._energy.moment)
+        self.section = np.empty(len(self._kappa), dtype=np.int64)
+        for node, part in zip(self._energy.nodes, self._energy.slices, strict=True):
+            self.section[part], self._kappa[part] = node.section, node.kappa
+        self.stored = self._stored()
+        self._stretching()
+        if not all(_uniform(segment) for tube in self._materials.robot.tubes for segment in tube.segments):
+            self._sliding()
         self._uncoupled()
-        if model.n:
-            self._coupled()
-            self._twist()
-        self.torque = {index: self._torque(index) for index in self.boundaries}
-        self.passing = np.concatenate([self.torque[index] for index in self.boundaries])
+        self._lead()
+        for row, motion in enumerate(motions):
+            self._guide(row, motion)
+            for boundary, segments in motion.opens:
+                self._thin(row, motion.side, boundary, segments)
 
-    def write(self, table: Array, rows: Indices, columns: Indices, values: ComplexArray) -> None:
-        """Adds Re[values exp(i (psi_second - psi_first))] to ``rows`` of ``table``, at distinct places."""
-        table[rows, columns] += values.real
-        table[rows, self.angles.one // 2 + columns] -= values.imag
+    def _stored(self) -> Array:
+        bending = self._materials.bending
+        stiffness = (bending.sum(axis=1)[:, None] - bending) * bending  # K^2 (1 / K - 1 / sum K), times sum K
+        return (0.5 * self._energy.coupling)[:, None] * stiffness.take(self.section, axis=0) * np.abs(self._kappa) ** 2
 
-    def square(self, boundary: int, tube: int) -> int:
-        """Column of the squared torque that passes ``boundary`` in ``tube``."""
-        return self.angles.one + 1 + self.boundaries.index(boundary) * self.model.tubes + tube
+    def _stretching(self) -> None:
+        """The coupled sections' bending is in proportion to their lengths."""
+        stretched = self.lengthening.take(self.section, axis=1)
+        self.one: Array = stretched.dot(self.stored.sum(axis=1))
+        self.growth: Array | ComplexArray = stretched.take(self._model.pairs.node, axis=1)
+
+    def _sliding(self) -> None:
+        """The coupled sections' bending changes as other pre-curvatures come to their nodes."""
+        energy, pairs, kappa = self._energy, self._model.pairs, self._kappa
+        x, slope = np.empty(len(kappa)), np.empty_like(kappa)
+        for node, part in zip(energy.nodes, energy.slices, strict=True):
+            x[part], slope[part] = node.rule.x, self._materials.pre_curvature_rate(node.section, node.s)
+        bent, moved = kappa != 0.0, self._moved(x)
+        # Where kappa* is 0 any finite number will do: the tube has no energy of its own there, and is in no pair.
+        growth = (moved * (slope / np.where(bent, kappa, 1.0))).reshape(len(moved), kappa.size)
+        self.one += 2.0 * growth.real.dot(self.stored.ravel())
+        place = pairs.node * self._model.tubes
+        of_pairs = growth.take(place + pairs.first, axis=1).conj() + growth.take(place + pairs.second, axis=1)
+        self.growth = self.growth + of_pairs
+        for g, tube in np.argwhere((slope != 0.0) & ~bent).tolist():
+            # Its product with another one has no logarithm, but a rate.
+            rate = energy.coupling[g] * self._materials.bending[self.section[g], tube] * slope[g, tube].conj()
+            for other in np.flatnonzero(bent[g]).tolist():
+                place_and_tubes = int(self.section[g]), float(x[g]), tube, other
+                self.beside[place_and_tubes] = -rate * energy.moment[g, other] * moved[:, g, tube]
+
+    def _moved(self, x: Array) -> Array:
+        """(F, G, N) dX_j / dD of the material at the nodes: their own motion, and the slide of the tube that moves."""
+        nodes = self._near.take(self.section, axis=1) + self._stretch.take(self.section, axis=1) * x
+        moved = np.repeat(nodes[:, :, None], self._model.tubes, axis=2)
+        for row, motion in enumerate(self.motions):
+            moved[row, :, motion.tube] += 1.0
+        return moved
 
     def _uncoupled(self) -> None:
-        """Where at most one tube is curved its density slides along with it: an end gains the density found there."""
-        for m in np.flatnonzero(self.materials.curved.any(axis=1) & ~self.materials.coupled).tolist():
-            tube = int(np.flatnonzero(self.materials.curved[m])[0])
-            segment, stiffness = int(self.domain.segment[m, tube]), float(self.materials.bending[m, tube])
-            share = 0.5 * stiffness * (1.0 - stiffness / float(self.materials.bending[m].sum()))
-            start, end = (share * abs(self.pre_curvature(tube, segment, at)) ** 2 for at in (m, m + 1))
-            self.right[m, self.angles.one], self.left[m, self.angles.one] = end, -start
-            self.slide[tube, self.angles.one] += end - start
+        """Where one tube is curved its density slides along with it: an end gains the density found there."""
+        for m, curved in enumerate(self._materials.curved_tubes):
+            stiffness = self._materials.bending[m].tolist()
+            if len(curved) == 1 and stiffness[curved[0]] < sum(stiffness):  # else it is alone, in its own shape
+                tube, own = curved[0], stiffness[curved[0]]
+                share = 0.5 * own * (1.0 - own / sum(stiffness))
+                kappa = self._materials.pre_curvature(m, self._materials.domain.boundaries[m : m + 2])[:, tube]
+                start, end = (share * np.abs(kappa) ** 2).tolist()
+                for row, motion in enumerate(self.motions):
+                    slide = float(motion.tube == tube)
+                    self.one[row] += (motion.far[m] + slide) * end - (motion.near[m] + slide) * start
 
-    def pre_curvature(self, tube: int, segment: int, boundary: int) -> complex:
-        """kappa* [1/m] of a tube's segment where it lies on ``boundary``."""
-        material = self.materials.robot.tubes[tube]
-        place = self.domain.boundaries[boundary] + self.domain.D[tube] - material.breaks[segment]
-        return complex(material.segments[segment].pre_curvature(place))
+    def _lead(self) -> None:
+        """Before the first coupled section stretching releases what the torques of the guide have stored."""
+        for m, stiffness in enumerate(self._materials.torsional[: self._energy.space.first].tolist()):
+            for row, motion in enumerate(self.motions):
+                for tube, own in enumerate(stiffness):
+                    if own:
+                        self._twist(row, 0, tube, motion.far[m] - motion.near[m], own)
 
-    def _coupled(self) -> None:
-        """Bending of the coupled sections, node by node and pair by pair."""
-        energy, angles, half = self.energy, self.angles, self.angles.one // 2
-        x, rate = np.concatenate([node.rule.x for node in energy.nodes]), self._moment_rate()
-        self._single_tubes(x, rate)
-        node, first, second = angles.node, angles.first, angles.second
-        column, row = np.arange(len(node)), self.section[node]
-        before, after = energy.moment[node, first].conj(), energy.moment[node, second]
-        share = -energy.coupling[node]
-        product = share * before * after
-        by_first, by_second = share * rate[node, first].conj() * after, share * before * rate[node, second]
-        both = by_first + by_second
-        right = product / self.domain.lengths[row] + x[node] * both
-        self.write(self.right, row, column, right)
-        self.write(self.left, row, column, both - right)
-        self.write(self.slide, first, column, by_first)
-        self.write(self.slide, second, column, by_second)
-        self.bending[column], self.bending[half + column] = product.real, -product.imag
-        self._pull = 1j * product
+    def _guide(self, row: int, motion: Motion) -> None:
+        """What goes into the guide is straightened, and the torque twists it."""
+        if motion.guided != ABSENT:
+            segment = self._materials.segment(motion.tube, motion.guided)
+            kappa = pre_curvature_at(self._materials, motion.tube, motion.guided, 0)
+            self.one[row] += 0.5 * segment.bending_stiffness * abs(kappa) ** 2
+            self._twist(row, 0, motion.tube, 1.0, segment.torsional_stiffness)
 
-    def _moment_rate(self) -> ComplexArray:
-        """(G, N) derivative of K kappa* [N] along each tube at the nodes."""
-        rates = [self.materials.pre_curvature_rate(node.section, node.s) for node in self.energy.nodes]
-        return self.materials.bending[self.section] * np.concatenate(rates)
+    def _thin(self, row: int, side: int, boundary: int, segments: list[int]) -> None:
+        """Energy per length of a section without length that opens at ``boundary`` with one of ``segments`` per
+        tube."""
+        moments, stiffness = {}, {}
+        for tube, index in enumerate(segments):
+            if index != ABSENT:
+                segment = self._materials.segment(tube, index)
+                stiffness[tube] = segment.bending_stiffness
+                moments[tube] = stiffness[tube] * pre_curvature_at(self._materials, tube, index, boundary)
+                self._twist(row, boundary, tube, side, segment.torsional_stiffness)
+        total = sum(stiffness.values())
+        for tube, moment in moments.items():
+            self.one[row] += side * 0.5 * abs(moment) ** 2 * (1.0 / stiffness[tube] - 1.0 / total)
+        section = min(boundary, self._materials.domain.n_sections - 1)
+        for (first, before), (second, after) in itertools.combinations(moments.items(), 2):
+            if before and after:
+                place_and_tubes = section, float(boundary - section), first, second
+                waves = self.beside.setdefault(place_and_tubes, np.zeros(len(self.motions), dtype=complex))
+                waves[row] -= side * before.conjugate() * after / total
 
-    def _single_tubes(self, x: Array, rate: ComplexArray) -> None:
-        """The part of the coupled sections' energy that each tube has without the others."""
-        energy, one = self.energy, self.angles.one
-        bending, length = self.materials.bending[self.section], self.domain.lengths[self.section]
-        total = bending.sum(axis=1)[:, None]
-        share = np.divide(1.0, bending, out=np.zeros_like(bending), where=bending > 0.0) - 1.0 / total
-        share *= energy.coupling[:, None] * total
-        stored = 0.5 * (share * np.abs(energy.moment) ** 2).sum(axis=1)
-        slide = share * (energy.moment.conj() * rate).real
-        both = slide.sum(axis=1)
-        right = stored / length + x * both
-        sections = np.arange(self.domain.n_sections)[:, None] == self.section
-        self.right[:, one] += sections.dot(right)
-        self.left[:, one] += sections.dot(both - right)
-        self.slide[:, one] += slide.sum(axis=0)
-        self.bending[one] = stored.sum()
+    def _twist(self, row: int, boundary: int, tube: int, growth: float, stiffness: float) -> None:
+        """Minus T^2 / (2 GJ) for each length that grows with the torque of ``boundary``."""
+        values = self.twisting.setdefault((boundary, tube), [0.0] * len(self.motions))
+        values[row] -= 0.5 * growth / stiffness
 
-    def _twist(self) -> None:
-        """Minus |q_m|^2 / (2 h), and minus T^2 / (2 GJ) before the first coupled section."""
-        model, space = self.model, self.energy.space
-        unknown, start = model.order[: model.n], self.size - model.n
-        for block in space.blocks:
-            if block.section >= 0:
-                inside = np.flatnonzero((block.columns.start <= unknown) & (unknown < block.columns.stop))
-                self._release(block.section, start + inside, 0.5 / self.domain.lengths[block.section])
-        for m in range(space.first):
-            tubes = np.flatnonzero(self.materials.torsional[m])
-            self._release(m, self.square(0, 0) + tubes, 0.5 / self.materials.torsional[m, tubes])
 
-    def _release(self, m: int, columns: Indices, values: Array | float) -> None:
-        self.right[m, columns] -= values
-        self.left[m, columns] += values
+def _uniform(segment: Segment) -> bool:
+    """True if the pre-curvature is the same all along the segment."""
+    return len(segment.curvature) <= 1 and not segment.turn
 
-    def _torque(self, boundary: int) -> Array:
-        """(N, C) torque [N m] that passes ``boundary``: what bending beyond it pulls."""
-        table = np.zeros((self.model.tubes, self.size))
-        if self.model.n:
-            column = np.flatnonzero(self.section[self.angles.node] >= boundary)
-            pull = self._pull[column]
-            self.write(table, self.angles.first[column], column, pull)
-            self.write(table, self.angles.second[column], column, -pull)
-        return table
 
-    def forces(self, side: int) -> Array:
-        """(N, C) dE/dD [N] towards ``side`` (+1, -1)."""
-        return self.slide + boundary_forces(self.domain, self, side)
+def _waves(model: ServingModel, beside: list[tuple[int, float, int, int]]) -> Array:
+    """(C, n + N + 1) the model's own waves, then those that give cosines and sines of the angles ``beside`` them."""
+    if not beside:
+        return model.waves
+    space, solved = model.energy.space, model.order[: model.n]
+    places = dict.fromkeys((section, x) for section, x, _, _ in beside)
+    psi = {place: space.angle_map(place[0], np.array([place[1]]))[0][:, solved] for place in places}
+    table = np.zeros((2, len(beside), model.waves.shape[1]))
+    for row, (section, x, first, second) in enumerate(beside):
+        table[:, row, : model.n] = psi[section, x][second] - psi[section, x][first]
+        table[:, row, model.n + first], table[:, row, model.n + second] = -1.0, 1.0
+    table[0, :, -1] = 0.5 * np.pi
+    return np.concatenate([model.waves, *table])
 
-    def thin(self, index: int, segments: Indices) -> Array:
-        row, one = np.zeros(self.size), self.angles.one
-        present: list[tuple[int, Segment, complex]] = []
-        for tube in np.flatnonzero(segments != ABSENT).tolist():
-            segment = self.materials.segment(tube, int(segments[tube]))
-            kappa = self.pre_curvature(tube, int(segments[tube]), index)
-            present.append((tube, segment, segment.bending_stiffness * kappa))
-            row[self.square(index, tube)] -= 0.5 / segment.torsional_stiffness
-        total = sum(segment.bending_stiffness for _, segment, _ in present)
-        for _, segment, moment in present:
-            row[one] += 0.5 * abs(moment) ** 2 * (1.0 / segment.bending_stiffness - 1.0 / total)
-        for (first, _, before), (second, _, after) in itertools.combinations(present, 2):
-            column, product = self.angles.columns[index, first, second], before.conjugate() * after / total
-            row[column] -= product.real
-            row[one // 2 + column] += product.imag
-        return row
 
-    def guide(self, tube: int, segment: int) -> Array:
-        row, guided = np.zeros(self.size), self.materials.segment(tube, segment)
-        row[self.angles.one] = 0.5 * guided.bending_stiffness * abs(self.pre_curvature(tube, segment, 0)) ** 2
-        row[self.square(0, tube)] = -0.5 / guided.torsional_stiffness
-        return row
+def _linear(model: ServingModel, rates: _Rates, columns: int) -> tuple[Array, Array]:
+    """What is to be multiplied with the sines of ``_waves`` (columns,): rows for N loads along alpha, F along D and
+    for the torques whose squares count, those in the guide excepted; and a row for the bending energy."""
+    pairs, tubes, rows = model.pairs, model.tubes, model.rows
+    force, passing = slice(tubes, tubes + len(rates.motions)), [key for key in rates.twisting if key[0]]
+    table, energy = np.zeros((force.stop + len(passing), columns)), np.zeros(columns)
+    pull = pairs.turns.T * pairs.amplitude
+    table[:tubes, rows : 2 * rows] = pull
+    table[force, :rows] = -pairs.amplitude * rates.growth.real
+    table[force, rows : 2 * rows] = pairs.amplitude * rates.growth.imag
+    table[force, 2 * rows] = rates.one
+    for column, wave in enumerate(rates.beside.values(), start=2 * rows + 2):
+        table[force, column], table[force, len(rates.beside) + column] = wave.real, -wave.imag
+    for row, (boundary, tube) in enumerate(passing, start=force.stop):
+        table[row, rows : 2 * rows] = pull[tube] * (rates.section[pairs.node] >= boundary)
+    energy[:rows], energy[2 * rows] = -pairs.amplitude, rates.stored.sum()
+    return table, energy
+
+
+def _squared(model: ServingModel, rates: _Rates, size: int) -> Array:
+    """(N + F, size + n + N + 1) what is to be multiplied with the squares of all ``size`` rows of ``_linear`` and all
+    of z, so that nothing need be cut out of them; the torques in the guide are the loads along alpha."""
+    tubes = model.tubes
+    table = np.zeros((tubes + len(rates.motions), size + model.n + tubes + 1))
+    force, passing = table[tubes:], itertools.count(len(table))
+    for (boundary, tube), twisting in rates.twisting.items():
+        force[:, next(passing) if boundary else tube] = twisting
+    unknowns = np.zeros((len(force), model.finer))
+    for block in model.energy.space.blocks:
+        if block.section >= 0:
+            unknowns[:, block.columns] = -0.5 * rates.lengthening[:, block.section, None]
+    force[:, size : size + model.n] = unknowns[:, model.order[: model.n]]
+    return table
