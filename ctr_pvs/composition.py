@@ -53,7 +53,7 @@ class Composition:
         self.twisting = np.logical_or.accumulate(pulled[::-1], axis=0)[::-1]
         self.curved_tubes = [np.flatnonzero(row).tolist() for row in self.curved]
         self.start = np.zeros(segments.shape)
-        for m, tube in zip(*np.nonzero(segments != ABSENT), strict=True):
+        for m, tube, _ in self._segments():
             self.start[m, tube] = robot.tubes[tube].breaks[segments[m, tube]]
         self.softness = np.divide(1.0, self.torsional, out=np.zeros_like(self.start), where=self.torsional > 0.0)
         self._coefficients = self._pre_curvatures()

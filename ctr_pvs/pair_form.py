@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ctr_pvs.composition import sealed
 from ctr_pvs.energy import TorsionEnergy
+from ctr_pvs.unknowns import KEPT
 from ctr_pvs.unknowns import Unknowns
 
 Array = NDArray[np.float64]
@@ -88,12 +89,12 @@ class _Rows:
         sealed(self)
 
 
-@lru_cache(maxsize=128)
+@lru_cache(maxsize=KEPT)
 def _rows(given: Unknowns) -> _Rows:
     return _Rows(given)
 
 
-@lru_cache(maxsize=128)
+@lru_cache(maxsize=64)
 def _packed(n: int) -> tuple[Indices, Indices, Array]:
     """Columns and rows of the entries in packed storage, and 1 for those of the diagonal."""
     column, row = np.tril_indices(n)

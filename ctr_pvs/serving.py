@@ -38,6 +38,7 @@ from ctr_pvs.solve import RESIDUAL_TWIST
 from ctr_pvs.solve import residual_limit
 from ctr_pvs.swing import tip_weights
 from ctr_pvs.twist import Degrees
+from ctr_pvs.unknowns import KEPT
 from ctr_pvs.unknowns import Unknowns
 
 Array = NDArray[np.float64]
@@ -262,7 +263,7 @@ class ServingModel:
         return residual, change, info
 
 
-@lru_cache(maxsize=128)
+@lru_cache(maxsize=KEPT)
 def _order(given: Unknowns) -> tuple[NDArray[np.int64], int]:
     """(n + extra,) the unknowns solved for, then those above: the two highest degrees of each section; how many are
     solved for.  Constants always are."""

@@ -16,6 +16,7 @@ from ctr_pvs.basis import gauss_legendre
 from ctr_pvs.composition import sealed
 from ctr_pvs.energy import PLAIN_NODES
 from ctr_pvs.energy import TorsionEnergy
+from ctr_pvs.unknowns import KEPT
 from ctr_pvs.unknowns import Places
 from ctr_pvs.unknowns import Unknowns
 
@@ -84,6 +85,6 @@ class _Swung:
         sealed(self)
 
 
-@lru_cache(maxsize=128)
+@lru_cache(maxsize=KEPT)
 def _swung(given: Unknowns) -> _Swung:
     return _Swung(given)

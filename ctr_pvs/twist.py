@@ -185,7 +185,7 @@ class TwistSpace:
     def lead_share(self, m: int | Indices, x: Array) -> Array:
         """(g, N) share of the lead's compliance that lies before the places ``x`` (g,) of a section m of the lead, or
         of one each (g,)."""
-        before, after, whole = self._leads[m], self._leads[m + 1], self._leads[-1]
+        before, after, whole = self._leads.take(m, axis=0), self._leads.take(m + 1, axis=0), self._leads[-1]
         reached = before + x[:, None] * (after - before)
         return np.divide(reached, whole, out=np.zeros_like(reached), where=whole > 0.0)
 

@@ -20,6 +20,8 @@ from ctr_pvs.lazy import lazy
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
+#: Topologies and degrees whose tables are kept.
+KEPT = 32
 CONSTANT = TwistBasis(0)
 END = np.ones(1)
 
@@ -27,11 +29,14 @@ END = np.ones(1)
 class Unknowns:
     """n unknowns in B blocks with F columns of frames together.
 
-    sections, bases : of each block; -1 for the lead.  columns : where its unknowns are.
+    composition : what the sections are made of.  section_bases : functions of the torques in each of them.
+    sections, bases : of each block; -1 for the ``lead``, if there is one.  columns : where its unknowns are, in frame
+    columns and in functions; frame_slices : where its frame columns are.
+    torsional (last + 1 - first, N) : GJ [N m^2] from the first coupled section on, without end where no tube twists.
     twisting (B, N) : tubes that twist in the block.  last_axes (B, N) : 1 for the last one of them.
     frame_block (F,) : block of each frame column.  frame_tube, frame_last (F,) : where a table (B, N) has the tube that
     the column stands for, and the last one of the block.  axes (N, F) : unit vectors of the former.
-    frame (n,) : frame column of each unknown.
+    frame, function (n,) : frame column of each unknown, and its function, counted over all blocks.
     """
 
     def __init__(self, made: Composition, bases: tuple[TwistBasis, ...], lead: bool) -> None:
@@ -41,23 +46,26 @@ class Unknowns:
         self.bases = [CONSTANT if m < 0 else bases[m] for m in self.sections]
         tubes = [np.flatnonzero(made.twisting[max(m, made.first)]).tolist() for m in self.sections]
         self.twisting = made.twisting[[max(m, made.first) for m in self.sections]]
-        #: (last + 1 - first, N) torsional stiffness [N m^2], without end where a tube does not twist
         self.torsional = np.where(made.twisting, made.torsional[: made.last + 1], np.inf)[made.first :]
         blocks: list[int] = []
         frame_tubes: list[int] = []
         frames: list[int] = []
+        functions: list[int] = []
+        known = 0
         self.frame_slices: list[slice] = []
         self.columns: list[slice] = []
         for block, (twisting, basis) in enumerate(zip(tubes, self.bases, strict=True)):
             first, start = len(blocks), len(frames)
             for tube in twisting[:-1]:
                 frames += [len(blocks)] * basis.size
+                functions += range(known, known + basis.size)
                 blocks.append(block)
                 frame_tubes.append(tube)
+            known += basis.size
             self.frame_slices.append(slice(first, len(blocks)))
             self.columns.append(slice(start, len(frames)))
-        self.frame_block, stands_for, self.frame = (
-            np.array(index, dtype=np.int64) for index in (blocks, frame_tubes, frames)
+        self.frame_block, stands_for, self.frame, self.function = (
+            np.array(index, dtype=np.int64) for index in (blocks, frame_tubes, frames, functions)
         )
         count = self.twisting.shape[1]
         last = np.array([twisting[-1] for twisting in tubes], dtype=np.int64)
@@ -69,10 +77,8 @@ class Unknowns:
 
     @lazy
     def alike(self) -> Array:
-        """(n, n) 1 for unknowns of one block and one function of its basis, else 0."""
-        parts = zip(self.sections, self.bases, self.frame_slices, strict=True)
-        labels = [(m, k) for m, basis, part in parts for _ in range(part.stop - part.start) for k in range(basis.size)]
-        return np.array([[float(a == b) for b in labels] for a in labels]).reshape(self.n, self.n)
+        """(n, n) 1 for unknowns of one function, else 0."""
+        return (self.function[:, None] == self.function).astype(float)
 
     def integrals(self, m: int, x: Array) -> Array:
         """(g, n) integral of each unknown's function up to the places ``x`` (g,) of section m, 1 for those of
@@ -116,7 +122,7 @@ class Places:
         return self.integrals**2
 
 
-@lru_cache(maxsize=128)
+@lru_cache(maxsize=KEPT)
 def unknowns(made: Composition, bases: tuple[TwistBasis, ...], lead: bool) -> Unknowns:
     """Those of the sections' ``bases``, with a block for the ``lead`` or without; the last few are kept."""
     return Unknowns(made, bases, lead)
