@@ -26,7 +26,7 @@ class Composition:
 
     bending, torsional (M, N) : K and GJ [N m^2], 0 where a tube is absent.  total (M,) : sum of K.
     softness (M, N) : 1 / GJ, 0 where absent.
-    start (M, N) : abscissa [m] of each segment's own start.
+    start (M, N) : abscissa [m] of each segment's own start.  starts : for each tube those of all segments, and these.
     curved (M, N) : true where a tube is present and pre-curved.  coupled (M,) : true where two or more of them are.
     curved_tubes : the pre-curved tubes of each section.  coupled_sections : indices of the coupled ones.
     first, last : the outermost coupled sections, (0, -1) without any.
@@ -52,9 +52,10 @@ class Composition:
         pulled = self.curved[: self.last + 1] & self.coupled[: self.last + 1, None]
         self.twisting = np.logical_or.accumulate(pulled[::-1], axis=0)[::-1]
         self.curved_tubes = [np.flatnonzero(row).tolist() for row in self.curved]
+        self.starts = [list(zip(tube.breaks.tolist(), tube.segments, strict=False)) for tube in robot.tubes]
         self.start = np.zeros(segments.shape)
         for m, tube, _ in self._segments():
-            self.start[m, tube] = robot.tubes[tube].breaks[segments[m, tube]]
+            self.start[m, tube] = self.starts[tube][segments[m, tube]][0]
         self.softness = np.divide(1.0, self.torsional, out=np.zeros_like(self.start), where=self.torsional > 0.0)
         self._coefficients = self._pre_curvatures()
         self._spin = 1j * turn if turn.any() else None

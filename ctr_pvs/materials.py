@@ -6,8 +6,6 @@ there the pre-curvature costs a fixed straightening energy and the twist is that
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -82,22 +80,19 @@ class Materials:
     @lazy
     def guide_compliance(self) -> Array:
         """(N,) twist of each tube's guided part per torque, int_0^D_j dX / GJ [rad/(N m)]."""
-        return np.array(
-            [self._guided(tube, lambda g, x: x / g.torsional_stiffness) for tube in range(len(self.domain.D))]
-        )
+        return np.array([sum([x / g.torsional_stiffness for g, x in part], 0.0) for part in self._guided()])
 
     @lazy
     def straightening_energy(self) -> Array:
         """(N,) energy [J] it takes to hold each tube's guided part straight, int_0^D_j K |kappa*|^2 / 2 dX."""
-        return np.array([self._guided(tube, _straightening) for tube in range(len(self.domain.D))])
+        return np.array([sum([_straightening(g, x) for g, x in part], 0.0) for part in self._guided()])
 
-    def _guided(self, tube: int, integral: Callable[[Segment, float], float]) -> float:
-        material, base = self.robot.tubes[tube], self.domain.D.item(tube)
-        total = 0.0
-        for start, segment in zip(material.breaks.tolist(), material.segments, strict=False):
-            if start < base:
-                total += integral(segment, min(base - start, segment.length))
-        return total
+    def _guided(self) -> list[list[tuple[Segment, float]]]:
+        """For each tube its segments in the guide, and how much [m] of each."""
+        return [
+            [(g, min(base - start, g.length)) for start, g in starts if start < base]
+            for starts, base in zip(self.composition.starts, self.domain.D.tolist(), strict=True)
+        ]
 
 
 def _straightening(segment: Segment, x: float) -> float:

@@ -32,15 +32,15 @@ class Pairs:
 
     amplitude, phase (R,) [J], [rad]; turns (R, N) = d theta / d alpha; map (R, n) = d theta / dq, with the columns of q
     in the given ``order``, else in that of ``energy``.
-    tubes : the two tubes of each pair; pair, node (R,) : which of them a row is about, and which Gauss point.
+    tubes : the two tubes of each pair; node (R,) : Gauss point of each row; member (pairs, R) : 1 for rows of a pair.
+    wave (R,) : amplitude exp(i phase).
     """
 
     def __init__(self, energy: TorsionEnergy, order: NDArray[np.int64] | slice = slice(None)) -> None:
         space = energy.space
         rows = _rows(space.unknowns)
         self.tubes, self.turns, self._ends = rows.tubes, rows.turns, rows.ends
-        self.pair, self.node, self.first, self.second = rows.pair, rows.node, rows.first, rows.second
-        #: (R,) amplitude exp(i phase)
+        self.member, self.node, self.first, self.second = rows.member, rows.node, rows.first, rows.second
         self.wave = energy.moment.take(rows.at_first).conj() * energy.moment.take(rows.at_second)
         self.wave *= energy.coupling.take(rows.node)
         self.amplitude, self.phase = np.abs(self.wave), np.angle(self.wave)
@@ -73,9 +73,10 @@ class _Rows:
         tubes, places = given.composition.bending.shape[1], given.nodes
         first, second = np.triu_indices(tubes, 1)
         curved = given.composition.curved[places.section]
-        self.node, self.pair = np.nonzero(curved[:, first] & curved[:, second])
+        self.node, pair = np.nonzero(curved[:, first] & curved[:, second])
         self.tubes = list(zip(first.tolist(), second.tolist(), strict=True))
-        self.first, self.second = first[self.pair], second[self.pair]
+        self.first, self.second = first[pair], second[pair]
+        self.member = (np.arange(len(self.tubes))[:, None] == pair).astype(complex)
         self.at_first, self.at_second = self.node * tubes + self.first, self.node * tubes + self.second
         self.integrals = places.integrals[self.node]
         self.turns = np.zeros((len(self.node), tubes))

@@ -8,13 +8,13 @@ property is smooth.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from functools import lru_cache
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ctr_pvs.lazy import lazy
 from ctr_pvs.robot import Robot
 
 #: Places closer than this [m] are one place.  Fixed, so that a kink is found by geometry and not by rounding.
@@ -62,24 +62,24 @@ class Domain:
     def n_sections(self) -> int:
         return len(self.segment)
 
-    @cached_property
+    @lazy
     def lengths(self) -> NDArray[np.float64]:
         """(M,) section lengths [m]."""
-        return np.diff(self.boundaries)
+        return self.boundaries[1:] - self.boundaries[:-1]
 
     @property
     def length(self) -> float:
         """Arc length [m] from the orifice to the farthest tip."""
-        return float(self.boundaries[-1])
+        return self.boundaries.item(-1)
 
-    @cached_property
+    @lazy
     def leader(self) -> int:
         """The tube that reaches farthest, the innermost of equals: poses carry its material frame."""
         # With nothing out, what lies in the guide just behind the orifice.
         reach = self.segment[-1] if self.n_sections else self.guide_segment
         return int(np.flatnonzero(reach != ABSENT)[-1])
 
-    @cached_property
+    @lazy
     def topology(self) -> Topology:
         """Equal for two domains whose sections hold the same segments in the same order."""
         return (*self.segment.shape, self.segment.tobytes(), self.guide_segment.tobytes())

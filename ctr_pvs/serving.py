@@ -139,10 +139,7 @@ class ServingModel:
         strength = np.abs(self.weights[:, : self.n].dot(turned)).sum(axis=0)
         stiffest = 1.0 + float((turned * turned).dot(self.pairs.amplitude).sum())
         waves = self.pairs.wave * (strength / stiffest)
-        parts = (
-            np.bincount(self.pairs.pair, part, len(self.pairs.tubes)).tolist() for part in (waves.real, waves.imag)
-        )
-        totals = (complex(*total) for total in zip(*parts, strict=True))
+        totals = self.pairs.member.dot(waves).tolist()
         return [(*ij, *cmath.polar(total)) for ij, total in zip(self.pairs.tubes, totals, strict=True) if total]
 
     def prepare(self, what: Hashable, make: Callable[[ServingModel], T]) -> T:
@@ -160,7 +157,7 @@ class ServingModel:
     def start(self, q: Array, alpha: Array) -> Array:
         """z for unknowns in the order of ``energy``."""
         z = np.empty(self.n + self.tubes + 1)
-        z[: self.n] = q[self.order[: self.n]]
+        z[: self.n] = q.take(self.order[: self.n])
         z[self.n : -1] = alpha
         z[-1] = 1.0
         return z
