@@ -24,6 +24,7 @@ from ctr_pvs.sections import piecewise_domain
 from ctr_pvs.serving import ServingModel
 from ctr_pvs.serving import raised
 from ctr_pvs.stability import stability_margin
+from ctr_pvs.swing import tip_weights
 
 PARTIAL = np.array([0.0935, 0.1705])
 
@@ -206,3 +207,26 @@ def test_loads_and_shape_of_a_served_answer_agree_with_the_general_ones(seed):
     assert np.abs(backbone.orientation - general.orientation).max() < 1e-5
     assert np.linalg.norm(backbone.orientation, axis=1) == pytest.approx(np.ones(41), abs=1e-12)
     assert backbone.position[-1] == pytest.approx(answer.tip.position, abs=1e-8)
+
+
+def test_the_bound_adds_up_what_every_place_swings():
+    """``tip_weights`` sum to what a walk over the Gauss points of all sections finds, tube by tube."""
+    for rng, model in scenes(12):
+        energy, change = model.energy, rng.standard_normal(model.finer)
+        total, length = 0.0, energy.materials.domain.length
+        for node in energy.all_nodes:
+            swing = (node.weight * (length - node.s))[:, None] * node.bending * np.abs(node.kappa) / node.bending.sum()
+            total += (swing * np.abs(energy.space.angle_map(node.section, node.rule.x) @ change)).sum()
+        assert np.abs(tip_weights(energy) @ change).sum() == pytest.approx(total, rel=1e-10)
+
+
+def test_what_a_topology_shares_carries_the_torques_to_another_D():
+    """Neighbouring base positions share their unknowns; q is then carried over as the torque field would be."""
+    for seed in range(8):
+        rng = np.random.default_rng([seed, 77])
+        robot = random_robot(rng, 2 + seed % 3, 1.0)
+        D = random_D(rng, robot)
+        before, after = (prepared(robot, D + step).energy.space for step in (0.0, 1e-9))
+        assert before.unknowns is after.unknowns
+        q = rng.standard_normal(before.n)
+        assert after.carried(q, before) == pytest.approx(after.coordinates(before.field(q)), abs=1e-12)
