@@ -51,8 +51,6 @@ EXECUTORS = {
 NODES = [
     ("node", False, "the node"),
     ("node", True, "the node, every command also slides the tubes"),
-    ("polling", False, "the node, polling"),
-    ("polling", True, "the node, polling, every command also slides the tubes"),
     ("objects", False, "the node, messages as Python objects"),
     ("echo", False, "echo, nothing solved"),
 ]

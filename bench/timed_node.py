@@ -1,6 +1,6 @@
 """The node with a stopwatch, and an echo node that solves nothing; each runs in a process of its own.
 
-    python bench/timed_node.py node|polling|objects|echo events|single|multi FILE
+    python bench/timed_node.py node|objects|echo events|single|multi FILE
 
 Until SIGINT; then FILE has, as JSON, the times [s] from the entry of the command callback to the end of the last
 publish, with the parts of them, and u.
@@ -145,8 +145,9 @@ def echo_node(times: Times) -> Node:
 def main() -> None:
     what, executor_kind, path = sys.argv[1:]
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    parameters = ["-p", f"robot_file:={ROBOT}", "-p", f"polling:={str(what == 'polling').lower()}"]
-    rclpy.init(args=["timed", "--ros-args", *parameters], signal_handler_options=SignalHandlerOptions.NO)
+    rclpy.init(
+        args=["timed", "--ros-args", "-p", f"robot_file:={ROBOT}"], signal_handler_options=SignalHandlerOptions.NO
+    )
     times: Times = {"in all": [], "solve": [], "publish": []}
     node = echo_node(times) if what == "echo" else timed_node(times)
     if what == "objects":
@@ -157,7 +158,7 @@ def main() -> None:
     executor.add_node(node)
     try:
         while not getattr(node, "interrupted", False):
-            executor.spin_once(timeout_sec=getattr(node, "patience", 0.1))
+            executor.spin_once(timeout_sec=0.1)
     except KeyboardInterrupt:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
     Path(path).write_text(json.dumps({"times": times, "u": min(unit() for _ in range(MEASUREMENTS))}))

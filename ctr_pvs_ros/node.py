@@ -60,7 +60,7 @@ EXIT_BAD_INPUT = 2
 # What a wrong parameter, robot file, or ROS argument (rclpy's RCLError is a RuntimeError) ends in.
 START_FAULTS = (ParameterException, RuntimeError, ValueError)
 LOG_PERIOD = 2.0  # s; at most one line of a kind in this time
-WAKE_PERIOD = 0.1  # s; a sleeping node sees a signal at the latest after this time
+WAKE_PERIOD = 0.1  # s; a signal is seen at the latest after this time
 CATCH_UP_PERIOD = 0.05  # s; late joiners wait no longer, and markers move no faster
 LAST_WORD = Duration(seconds=0.2)  # for viewers to hear that the tubes are gone
 
@@ -114,11 +114,6 @@ class EquilibriumNode(Node):
         self._markers.wait_for_all_acked(LAST_WORD)
         self._service.stop()
         super().destroy_node()
-
-    @property
-    def patience(self) -> float:
-        """How long who spins it should sleep where nothing is to be done [s]."""
-        return 0.0 if self._settings.polling else WAKE_PERIOD
 
     def _new_solver(self) -> EquilibriumSolver:
         settings = self._settings
@@ -289,7 +284,7 @@ def _spin(node: EquilibriumNode) -> None:
     executor = _new_executor()
     executor.add_node(node)
     while rclpy.ok() and not node.interrupted:
-        executor.spin_once(timeout_sec=node.patience)
+        executor.spin_once(timeout_sec=WAKE_PERIOD)
 
 
 def _new_executor() -> Executor:

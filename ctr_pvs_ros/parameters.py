@@ -34,7 +34,6 @@ class Settings:
     on_snap: str
     command_timeout: float
     compute_budget: float
-    polling: bool
     merge_partial: bool
     clamp_to_limits: bool
     accept_nameless: bool
@@ -99,9 +98,6 @@ PARAMETERS: dict[str, ParameterRule] = {
         0.0, "Diagnostics say stale when no command came for this long [s]; 0: never.", bounds=(0.0, 86400.0)
     ),
     "compute_budget": ParameterRule(1.0, "Wall-clock limit of one solve [s].", bounds=(1e-4, 60.0)),
-    "polling": ParameterRule(
-        False, "Look for commands all the time instead of sleeping till one comes: quicker, for more processor time."
-    ),
     "merge_partial": ParameterRule(
         False, "Complete a command that names only some joints from the last accepted one; otherwise refuse it."
     ),

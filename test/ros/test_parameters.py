@@ -1,7 +1,6 @@
 """What the parameters change, seen from outside."""
 
 import dataclasses
-import time
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -11,7 +10,6 @@ from std_msgs.msg import Float64MultiArray
 
 from ctr_pvs_ros.parameters import PARAMETERS
 from ctr_pvs_ros.parameters import Settings
-from ros.load import turns
 
 JOINTS = ["outer_rotation", "outer_translation", "inner_rotation", "inner_translation"]
 GOOD = dict(zip(JOINTS, (0.0, 0.0935, 0.5, 0.2085), strict=True))
@@ -178,19 +176,3 @@ def test_the_parameter_file_repeats_the_defaults(strict):
     """Checked on a running node: what its file sets and no test changes is what the table says."""
     for name in ("frame_id", "tolerance", "fidelity", "force_model", "publish_backbone_s", "accept_nameless"):
         assert strict.get_parameter(name) == PARAMETERS[name].default
-
-
-def awakenings(process_id):
-    """How often a process wakes in a second without commands."""
-    began, before = time.monotonic(), turns(process_id)
-    time.sleep(0.5)
-    return (turns(process_id) - before) / (time.monotonic() - began)
-
-
-def test_a_polling_node_does_not_sleep_and_answers(strict):
-    assert awakenings(strict.process.id) < 300
-    assert strict.set_parameter("polling", True).successful
-    assert awakenings(strict.process.id) > 1000
-    assert strict.client.command(GOOD, TIMEOUT).joints.position.tolist() == list(GOOD.values())
-    assert strict.set_parameter("polling", False).successful
-    assert awakenings(strict.process.id) < 300
