@@ -5,8 +5,7 @@ couples the tubes, and the torques of all tubes add up to zero at every s.  What
 
 * one *lead* block: the constant torques in the guide and in the sections before the first coupled one, merged;
 * a block for every later section up to the last coupled one: Legendre polynomials where the section is coupled,
-constants
-  where it is not;
+  constants where it is not;
 * nothing past the last coupled section, where no torque is left.
 
 The unknowns are scaled so that the torsional energy is q.q / 2 [J]: eigenvalues of the energy Hessian in q are then

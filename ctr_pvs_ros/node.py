@@ -202,6 +202,8 @@ class EquilibriumNode(Node):
         policy = Policy(settings.on_snap, settings.margin_warn, settings.margin_stop)
         self.solving = True
         try:
+            if self.interrupted:  # the signal came before there was a solve for it to end
+                raise KeyboardInterrupt
             answer = self._stream.follow(command, policy, settings.compute_budget)
         finally:
             self.solving = False

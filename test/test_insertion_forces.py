@@ -133,12 +133,13 @@ def random_loop(rng, robot):
 
 
 def check_random_loops(tubes, seeds):
+    """At one level: where ``auto`` leaves twist out and takes it in again, the energy changes by what twist holds."""
     closed = 0
     for seed in seeds:
         rng = np.random.default_rng([seed, tubes, 3])
         robot = random_robot(rng, tubes)
         try:
-            trip = loops.travel(EquilibriumSolver(robot, 1e-8), random_loop(rng, robot))
+            trip = loops.travel(EquilibriumSolver(robot, 1e-8, fidelity="torsion"), random_loop(rng, robot))
         except loops.PathLost:
             continue  # it snapped: no loop through equilibria
         if trip.same_equilibrium():

@@ -53,6 +53,16 @@ def test_a_broken_solve_is_told_and_the_stream_goes_on(node, monkeypatch):
     assert values["answers published"] == "1"
 
 
+def test_a_command_that_comes_after_the_signal_is_not_solved(node, monkeypatch):
+    """Both can find the executor asleep; a solve that began after the signal could not be ended by it."""
+    monkeypatch.setattr(node._stream, "_solver", BrokenSolver())
+    node.interrupted = True
+    _, values = command(node)
+    assert values["internal errors"] == "0"
+    assert values["commands accepted"] == "0"
+    assert not node.solving
+
+
 def test_an_answer_that_cannot_be_sent_is_told_and_the_stream_goes_on(node, monkeypatch):
     with monkeypatch.context() as broken:
         broken.setattr(node._outputs, "publish", BrokenSolver().solve)

@@ -38,6 +38,7 @@ PERIOD = 0.005  # s, between commands
 BROKEN = 100  # one command in so many
 EVENT_PERIOD = 0.5  # s, between the things that happen beside the stream
 SAMPLE_PERIOD = 1.0  # s, between looks at the node's memory and waiting time
+JOINING = 4.0  # s; until then the middleware now and then holds up a publisher for a third of a second (reliability.md)
 WARM_UP = 60.0  # s; until then tables are filled that stay. Memory is compared with what it was then
 MEMORY_GROWTH = 5.0  # MB
 JOINTS = ["outer_rotation", "outer_translation", "inner_rotation", "inner_translation"]
@@ -83,8 +84,12 @@ class Company:
         """The next event."""
         next(self._events)()
 
+    def ready(self):
+        """Whether all that is to be asked has been found."""
+        return self._parameters.services_are_ready() and self._solve.service_is_ready()
+
     def _ask(self, future, good):
-        self._asked.append((future, good))
+        self._asked.append((time.monotonic(), future, good))
 
     def _set(self):
         name, value = next(self._right)
@@ -113,10 +118,10 @@ class Company:
             self._load.ros.destroy_subscription(self._visitors.pop())
 
     def faults(self):
-        """How many requests there were, and which were not answered as they should be."""
+        """How many requests there were, and which were not answered as they should be, with when they were made."""
         wrong = [
-            future.result() if future.done() else "no answer"
-            for future, good in self._asked
+            (when, future.result() if future.done() else "no answer")
+            for when, future, good in self._asked
             if not (future.done() and good(future.result()))
         ]
         return len(self._asked), wrong
@@ -145,6 +150,8 @@ class Account:
 
     def run(self):
         """The stream and its company; returns when all is said."""
+        self.load.spin_to(time.monotonic() + JOINING)
+        assert self.company.ready()
         due = begin = time.monotonic()
         next_event, next_sample = begin + 1.0, begin + 1.0
         for count in range(int(self._seconds / PERIOD)):
@@ -203,7 +210,10 @@ class Account:
     def report(self):
         """The figures, a line each."""
         answered, lost = self.load.answered, self.lost()
-        delays = sorted(answered[stamp] - self.load.sent[stamp] for stamp in self.good if stamp in answered)
+        told = [stamp for stamp in self.good if stamp in answered]
+        delays = sorted(answered[stamp] - self.load.sent[stamp] for stamp in told)
+        slowest = max(told, key=lambda stamp: answered[stamp] - self.load.sent[stamp])
+        begin = self.samples[0].when
         p50, p99, p999 = (delays[int(share * len(delays))] * 1e3 for share in (0.5, 0.99, 0.999))
         asked, wrong = self.company.faults()
         took = self.samples[-1].when - self.samples[0].when
@@ -211,10 +221,11 @@ class Account:
         growth = self.growth()
         grown = "too short to tell growth" if growth is None else f"{growth:+.2f} MB since {WARM_UP:g} s"
         lines = (
-            f"{took / 60:.1f} min: {len(self.good)} good commands, {len(lost)} of them not answered",
+            f"{took / 60:.1f} min: {len(self.good)} good commands, {len(lost)} of them not answered, in the seconds "
+            f"{sorted({int(when - begin) for when in lost})}",
             f"the node stood in line for a processor {waited:.1f} s, which explains up to {int(waited / PERIOD)}",
             f"command to tip, client included: median {p50:.2f} ms, 99 % {p99:.2f}, 99.9 % {p999:.2f}, "
-            f"max {delays[-1] * 1e3:.2f}",
+            f"max {delays[-1] * 1e3:.2f} after {self.load.sent[slowest] - begin:.1f} s",
             f"broken: {sum(self.refusals.values())} sent, {self.uncounted()} of them not counted",
             f"beside it: {asked} requests, {len(wrong)} answered wrongly; {self.company.visits} visitors",
             f"memory: {self.samples[0].memory:.1f} MB at first, {self.samples[-1].memory:.1f} MB at last, {grown}",
