@@ -29,6 +29,8 @@ TOLERANCE = 1e-6  # m
 STEP = 0.1  # deg
 #: Steps of 0.1 deg over which the median is taken, and the longest step [deg] of the way to the first of them.
 STEPS, APPROACH = 2000, 5.0
+#: How much farther the innermost tube is out after each step where bases move, too [m].
+SLIDE = 1e-5
 POSES = 60
 
 
@@ -54,6 +56,11 @@ class Stroke:
         for index in range(1, many + 1):
             lap = index % (2 * turns)
             yield np.radians(self.low + STEP * min(lap, 2 * turns - lap)) * self.direction
+
+    def slid(self, alpha: Array) -> Array:
+        """Base positions (N,) [m] at ``alpha`` where bases move with the angle: inner tubes farther than outer ones."""
+        angle = np.degrees(alpha.dot(self.direction) / self.direction.dot(self.direction))
+        return self.D - (angle - self.low) / STEP * SLIDE * np.linspace(0.0, 1.0, len(alpha))
 
 
 def strokes() -> list[Stroke]:
@@ -94,14 +101,14 @@ ASKED: dict[str, tuple[Ask, float]] = {
 }
 
 
-def serve(stroke: Stroke, ask: Ask, many: int = STEPS) -> Timing:
-    """The median over ``many`` warm steps."""
+def serve(stroke: Stroke, ask: Ask, many: int = STEPS, sliding: bool = False) -> Timing:
+    """The median over ``many`` warm steps; sliding : whether each moves the bases, too."""
     solver = EquilibriumSolver(stroke.robot, TOLERANCE)
     for alpha in stroke.approach():
         solver.solve(alpha, stroke.D)
     watch = Stopwatch()
     for alpha in stroke.steps(many):
-        answer = watch.time(partial(ask, solver, alpha, stroke.D))
+        answer = watch.time(partial(ask, solver, alpha, stroke.slid(alpha) if sliding else stroke.D))
         assert isinstance(answer, Equilibrium)
         if answer.status is not Status.OK:
             raise RuntimeError(f"{stroke.name} at {np.degrees(alpha)} deg: {answer.message}")

@@ -87,6 +87,14 @@ def steps_table(chosen: list[Stroke], many: int) -> str:
     return table([f"median of {many:,} steps of 0.1°", "target", *(stroke.name for stroke in chosen)], rows)
 
 
+def sliding_table(chosen: list[Stroke], many: int) -> str:
+    """Every step at a base position of its own."""
+    rows = [
+        [name, *(told(serve(stroke, ask, many, sliding=True)) for stroke in chosen)] for name, (ask, _) in ASKED.items()
+    ]
+    return table([f"median of {many:,} steps of 0.1° and 10 µm", *(stroke.name for stroke in chosen)], rows)
+
+
 def tubes_table(many: int) -> str:
     """Three nested tubes against two of the same family."""
     rows = []
@@ -187,6 +195,7 @@ def main() -> None:
         chosen, compared = chosen[:1], scenes(1, 2)[:1]
     publish("machine", machine(), document)
     publish("warm steps", steps_table(chosen, many), document)
+    publish("sliding steps", sliding_table([chosen[0], chosen[-1]], many // 2), document)
     publish("three tubes", tubes_table(many // 2), document)
     publish("batch", batch_table(size), document)
     courses = [Course(scene) for scene in compared]
