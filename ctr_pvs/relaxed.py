@@ -24,6 +24,8 @@ Array = NDArray[np.float64]
 MANY_TUBES = 4
 #: Base angles closer than this [rad] are one state.
 SAME_ANGLE = 1e-5
+#: Where the gradient is no larger there is nothing to descend: tubes curved in one plane start out so.
+LEVEL = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +44,8 @@ def relaxed_state(energy: TorsionEnergy) -> Relaxed | None:
     tubes = energy.materials.robot.n_tubes
     if energy.n == 0:
         return Relaxed(np.zeros(tubes), np.zeros(0), False, energy.space.field(np.zeros(0)))
-    minima = [found for start in _starts(energy) if (found := _minimum(energy, start)) is not None]
+    joint = _JointEnergy(energy)
+    minima = [found for start in _starts(energy) if (found := _minimum(joint, start)) is not None]
     if not minima:
         return None
     minima.sort(key=lambda found: (round(float(np.abs(found[0]).max()), 6), *(-found[0]).round(6)))
@@ -64,19 +67,20 @@ def _starts(energy: TorsionEnergy) -> list[Array]:
     aligned = wrapped(aligned - aligned[0])
     tubes = len(phase)
     turns = product((0.0, np.pi), repeat=tubes - 1) if tubes <= MANY_TUBES else [(0.0,) * (tubes - 1)]
-    return [np.zeros(tubes), *(aligned + np.array([0.0, *turn]) for turn in turns)]
+    starts = [aligned + np.array([0.0, *turn]) for turn in turns]
+    return starts if np.abs(aligned).max() < SAME_ANGLE else [np.zeros(tubes), *starts]
 
 
-def _minimum(energy: TorsionEnergy, start: Array) -> tuple[Array, Array] | None:
+def _minimum(joint: _JointEnergy, start: Array) -> tuple[Array, Array] | None:
     """Descend E over (q, alpha_2 .. alpha_N) from ``start``; None unless it ends in a minimum."""
-    joint = _JointEnergy(energy)
+    energy = joint.energy
     x = joint.pack(np.zeros(energy.n), start)
     for _ in range(3):
-        # Not "trust-exact": scipy 1.11's can loop for ever on a singular Hessian.
-        found = minimize(
-            joint.value, x, jac=joint.gradient, hess=joint.hessian, method="trust-ncg", options={"gtol": 1e-9}
-        )
-        x = found.x
+        if np.abs(joint.gradient(x)).max() > LEVEL:
+            # Not "trust-exact": scipy 1.11's can loop for ever on a singular Hessian.
+            x = minimize(
+                joint.value, x, jac=joint.gradient, hess=joint.hessian, method="trust-ncg", options={"gtol": LEVEL}
+            ).x
         lowest, vectors = np.linalg.eigh(joint.hessian(x))
         if lowest[0] > -1e-9:
             break

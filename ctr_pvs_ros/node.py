@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import signal
+import time
 import traceback
 from collections.abc import Callable
 from typing import Any
@@ -99,11 +100,12 @@ class EquilibriumNode(Node):
         self._service = ServiceProcess(self, self._settings)
         if initial is not None:
             self._guarded(self._solve)(initial, self.get_clock().now().to_msg())
-        self.create_subscription(JointState, "servo_jp", self._guarded(self._on_command), NEWEST_WINS)
+        self.create_subscription(JointState, "servo_jp", self._guarded(self._on_message), NEWEST_WINS)
         # Both go on while simulated time stands still.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(CATCH_UP_PERIOD, self._guarded(self._outputs.catch_up), clock=steady)
-        self.create_timer(1.0, self._guarded(self._publish_diagnostics), clock=steady)
+        self._diagnostics_due: float | None = None  # since when, on a steady clock [s]
+        self.create_timer(CATCH_UP_PERIOD, self._guarded(self._catch_up), clock=steady)
+        self.create_timer(1.0, self._guarded(self._look_round), clock=steady)
         self.add_on_set_parameters_callback(self._on_set_parameters)
         self.add_post_set_parameters_callback(self._after_set_parameters)
         self.get_logger().info(f"serving robot {self._robot.name!r} from {self._settings.robot_file}")
@@ -175,6 +177,13 @@ class EquilibriumNode(Node):
 
         return guarded
 
+    def _on_message(self, message: JointState) -> None:
+        self._on_command(message)
+        # Diagnostics take longer than an answer. Begun here, they have till the next command but one before that
+        # would overtake the next.
+        if self._diagnostics_due is not None:
+            self._publish_diagnostics()
+
     def _on_command(self, message: JointState) -> None:
         stamp, age = self._stamp_for(message.header.stamp)
         self._report.received(age)
@@ -219,11 +228,19 @@ class EquilibriumNode(Node):
         elif answer.verdict.remark:
             self.get_logger().warning(answer.verdict.remark, throttle_duration_sec=LOG_PERIOD)
 
-    def _publish_diagnostics(self) -> None:
+    def _catch_up(self) -> None:
+        self._outputs.catch_up()
+        if self._diagnostics_due is not None and time.monotonic() - self._diagnostics_due > CATCH_UP_PERIOD:
+            self._publish_diagnostics()  # no command has come meanwhile
+
+    def _look_round(self) -> None:
         if self._service.revive():
             self.get_logger().error("the service's process ended unexpectedly and was started again")
-        if self._diagnostics.get_subscription_count() == 0:
-            return
+        if self._diagnostics.get_subscription_count() > 0:
+            self._diagnostics_due = time.monotonic()
+
+    def _publish_diagnostics(self) -> None:
+        self._diagnostics_due = None
         name = f"{self.get_fully_qualified_name().lstrip('/')}: equilibrium"
         status = self._report.status(name, self._robot.name, self._settings.command_timeout)
         header = Header(stamp=self.get_clock().now().to_msg())

@@ -1,5 +1,7 @@
 """What should not happen: code that fails in a way nobody has thought of does not end the node."""
 
+import time
+
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.parameter import Parameter
@@ -9,6 +11,7 @@ from std_msgs.msg import Header
 from ctr_pvs import load_robot
 from ctr_pvs_interfaces.srv import SolveEquilibrium
 from ctr_pvs_ros.commands import CommandReader
+from ctr_pvs_ros.node import CATCH_UP_PERIOD
 from ctr_pvs_ros.node import EquilibriumNode
 from ctr_pvs_ros.process import share_file
 from ctr_pvs_ros.service import SolveService
@@ -78,3 +81,33 @@ def test_the_service_answers_when_its_solver_is_broken(graph):
     assert not response.success
     assert response.status == "not_converged"
     assert "a mistake" in response.message
+
+
+class Told:
+    """In place of the publisher of diagnostics."""
+
+    def __init__(self):
+        self.count = 0
+
+    def get_subscription_count(self):
+        return 1
+
+    def publish(self, message):
+        self.count += 1
+
+
+def test_diagnostics_go_out_right_after_an_answer_or_when_none_comes(node, monkeypatch):
+    """They take longer than an answer: begun just before a command they would make it late, and overtaken."""
+    told = Told()
+    monkeypatch.setattr(node, "_diagnostics", told)
+    node._look_round()
+    node._catch_up()
+    assert told.count == 0
+    command(node)
+    assert told.count == 1
+    command(node)
+    assert told.count == 1
+    node._look_round()
+    time.sleep(2.0 * CATCH_UP_PERIOD)
+    node._catch_up()
+    assert told.count == 2
