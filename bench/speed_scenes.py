@@ -19,7 +19,7 @@ CONFIG = Path(__file__).resolve().parents[1] / "config"
 SEED, FIG2 = load_robot(CONFIG / "renda2021.yaml"), load_robot(CONFIG / "renda2021_fig2.yaml")
 FULL_OVERLAP, PARTIAL_OVERLAP = np.array([0.0935, 0.2085]), np.array([0.0935, 0.1705])
 #: Where the branch ends [deg]: test/data/reference_values.json.
-FULL_FOLD, PARTIAL_FOLD = 281.889981, 205.921639
+PARTIAL_FOLD = 205.921639
 
 
 @dataclass(frozen=True, eq=False)

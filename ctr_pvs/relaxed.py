@@ -59,7 +59,7 @@ def relaxed_state(energy: TorsionEnergy) -> Relaxed | None:
 
 
 def _starts(energy: TorsionEnergy) -> list[Array]:
-    """Base angles to descend from: zero, those that align the tubes' mean curvatures, and half turns of these."""
+    """Base angles to descend from, each once: zero, those that align the tubes' mean curvatures, half turns."""
     moments = np.sqrt(energy.coupling)[:, None] * energy.moment
     _, vectors = np.linalg.eigh(moments.T @ moments.conj())
     phase = vectors[:, -1]

@@ -179,8 +179,8 @@ class EquilibriumNode(Node):
 
     def _on_message(self, message: JointState) -> None:
         self._on_command(message)
-        # Diagnostics take longer than an answer. Begun here, they have till the next command but one before that
-        # would overtake the next.
+        # Diagnostics take longer than an answer. Begun here, they cost a command only if they last until the second
+        # one from now comes, which would overtake the first.
         if self._diagnostics_due is not None:
             self._publish_diagnostics()
 
@@ -229,9 +229,10 @@ class EquilibriumNode(Node):
             self.get_logger().warning(answer.verdict.remark, throttle_duration_sec=LOG_PERIOD)
 
     def _catch_up(self) -> None:
-        self._outputs.catch_up()
+        # Diagnostics first: should an output fail here, they are what tells of it.
         if self._diagnostics_due is not None and time.monotonic() - self._diagnostics_due > CATCH_UP_PERIOD:
             self._publish_diagnostics()  # no command has come meanwhile
+        self._outputs.catch_up()
 
     def _look_round(self) -> None:
         if self._service.revive():

@@ -1,4 +1,5 @@
-"""What should not happen: code that fails in a way nobody has thought of does not end the node."""
+"""A node in this process, to break its parts and to see their order: code that fails in a way nobody has thought of
+does not end it, a signal is not outlived by a solve, and diagnostics wait for their turn."""
 
 import time
 
@@ -111,3 +112,13 @@ def test_diagnostics_go_out_right_after_an_answer_or_when_none_comes(node, monke
     time.sleep(2.0 * CATCH_UP_PERIOD)
     node._catch_up()
     assert told.count == 2
+
+
+def test_diagnostics_go_out_although_an_output_fails(node, monkeypatch):
+    told = Told()
+    monkeypatch.setattr(node, "_diagnostics", told)
+    monkeypatch.setattr(node._outputs, "catch_up", BrokenSolver().solve)
+    node._look_round()
+    time.sleep(2.0 * CATCH_UP_PERIOD)
+    node._guarded(node._catch_up)()
+    assert told.count == 1
