@@ -2,6 +2,7 @@
 
 from glob import glob
 
+from setuptools import find_packages
 from setuptools import setup
 
 PACKAGE = "ctr_pvs"
@@ -14,7 +15,7 @@ setup(
     maintainer_email="maintainers@users.noreply.github.com",
     license="Apache-2.0",
     python_requires=">=3.11",
-    packages=["ctr_pvs", "ctr_pvs_ros"],
+    packages=find_packages(include=["ctr_pvs", "ctr_pvs.*", "ctr_pvs_ros", "ctr_pvs_ros.*"]),
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (f"share/{PACKAGE}", ["package.xml"]),

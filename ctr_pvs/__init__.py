@@ -13,11 +13,11 @@ from ctr_pvs.equilibrium import Equilibrium
 from ctr_pvs.errors import CommandError
 from ctr_pvs.errors import RobotError
 from ctr_pvs.errors import RobotFileError
-from ctr_pvs.robot import Limits
-from ctr_pvs.robot import Robot
-from ctr_pvs.robot import Segment
-from ctr_pvs.robot import Tube
-from ctr_pvs.robot_file import load_robot
+from ctr_pvs.robot.file import load_robot
+from ctr_pvs.robot.robot import Limits
+from ctr_pvs.robot.robot import Robot
+from ctr_pvs.robot.robot import Segment
+from ctr_pvs.robot.robot import Tube
 from ctr_pvs.solver import EquilibriumSolver
 from ctr_pvs.status import NoEquilibriumError
 from ctr_pvs.status import Status

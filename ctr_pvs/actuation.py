@@ -28,7 +28,7 @@ from ctr_pvs.energy import SectionNodes
 from ctr_pvs.energy import bending_density
 from ctr_pvs.energy import shared_curvature
 from ctr_pvs.materials import Materials
-from ctr_pvs.robot import Segment
+from ctr_pvs.robot.robot import Segment
 from ctr_pvs.sections import ABSENT
 from ctr_pvs.sections import Domain
 from ctr_pvs.sections import Event

@@ -22,12 +22,12 @@ from ctr_pvs.batch_state import margins
 from ctr_pvs.batch_state import rebuilt
 from ctr_pvs.batch_state import tip_estimates
 from ctr_pvs.batch_tables import Tables
-from ctr_pvs.command import LARGEST_ALPHA
 from ctr_pvs.equilibrium import Equilibrium
 from ctr_pvs.errors import CommandError
 from ctr_pvs.errors import FieldError
 from ctr_pvs.refine import INTEGRATION_SHARE
-from ctr_pvs.robot import Robot
+from ctr_pvs.robot.command import LARGEST_ALPHA
+from ctr_pvs.robot.robot import Robot
 from ctr_pvs.status import Status
 
 Array = NDArray[np.float64]

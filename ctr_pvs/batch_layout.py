@@ -19,8 +19,8 @@ from ctr_pvs.fidelity import HIGHEST_DEGREE
 from ctr_pvs.fidelity import LOWEST_DEGREE
 from ctr_pvs.fidelity import TURN_SHARE
 from ctr_pvs.materials import Materials
-from ctr_pvs.robot import Robot
-from ctr_pvs.robot import Segment
+from ctr_pvs.robot.robot import Robot
+from ctr_pvs.robot.robot import Segment
 from ctr_pvs.sections import ABSENT
 from ctr_pvs.sections import SAME_PLACE
 from ctr_pvs.sections import piecewise_domain

@@ -17,7 +17,7 @@ from ctr_pvs.batch_layout import hashed
 from ctr_pvs.batch_layout import topology_keys
 from ctr_pvs.batch_pilots import relative_angle
 from ctr_pvs.batch_relaxed import start_of
-from ctr_pvs.robot import Robot
+from ctr_pvs.robot.robot import Robot
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -13,8 +13,8 @@ from ctr_pvs.cli_words import UsageError
 from ctr_pvs.cli_words import number
 from ctr_pvs.cli_words import whole_number
 from ctr_pvs.figures import PictureError
-from ctr_pvs.robot import Robot
-from ctr_pvs.robot_file import load_robot
+from ctr_pvs.robot.file import load_robot
+from ctr_pvs.robot.robot import Robot
 from ctr_pvs.stability_figures import save_pictures
 from ctr_pvs.stability_report import scan_as_json
 from ctr_pvs.stability_report import scan_as_text

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ctr_pvs.lazy import lazy
-from ctr_pvs.robot import Robot
-from ctr_pvs.robot import Segment
+from ctr_pvs.robot.robot import Robot
+from ctr_pvs.robot.robot import Segment
 from ctr_pvs.sections import ABSENT
 from ctr_pvs.sections import Domain
 

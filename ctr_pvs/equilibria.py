@@ -24,7 +24,7 @@ from ctr_pvs.multistart import search
 from ctr_pvs.refine import INTEGRATION_SHARE
 from ctr_pvs.refine import LOOSER
 from ctr_pvs.refine import tip_position
-from ctr_pvs.robot import Robot
+from ctr_pvs.robot.robot import Robot
 from ctr_pvs.solution import TorsionSolution
 from ctr_pvs.solve import residual_limit
 from ctr_pvs.solve import twist_size

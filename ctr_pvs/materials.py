@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from ctr_pvs.composition import composition
 from ctr_pvs.lazy import lazy
-from ctr_pvs.robot import Robot
-from ctr_pvs.robot import Segment
+from ctr_pvs.robot.robot import Robot
+from ctr_pvs.robot.robot import Segment
 from ctr_pvs.sections import Domain
 
 Array = NDArray[np.float64]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ctr_pvs.energy import TorsionEnergy
 from ctr_pvs.materials import Materials
 from ctr_pvs.pair_form import Pairs
-from ctr_pvs.robot import Robot
+from ctr_pvs.robot.robot import Robot
 from ctr_pvs.sections import piecewise_domain
 from ctr_pvs.twist import Degrees
 

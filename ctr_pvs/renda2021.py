@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ctr_pvs.basis import gauss_legendre
 from ctr_pvs.errors import FieldError
-from ctr_pvs.robot import Robot
+from ctr_pvs.robot.robot import Robot
 from ctr_pvs.sections import ABSENT
 from ctr_pvs.shape import Shape
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ctr_pvs.backbone import Pose
 from ctr_pvs.equilibrium import Equilibrium
-from ctr_pvs.robot import Robot
+from ctr_pvs.robot.robot import Robot
 from ctr_pvs.status import NoEquilibriumError
 
 LOAD_NOTE = (

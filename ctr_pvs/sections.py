@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ctr_pvs.lazy import lazy
-from ctr_pvs.robot import Robot
+from ctr_pvs.robot.robot import Robot
 
 #: Places closer than this [m] are one place.  Fixed, so that a kink is found by geometry and not by rounding.
 SAME_PLACE = 1e-12

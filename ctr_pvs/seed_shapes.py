@@ -14,7 +14,7 @@ from ctr_pvs.full import FullEnergy
 from ctr_pvs.full_solution import FullSolution
 from ctr_pvs.full_solution import solve_full
 from ctr_pvs.materials import Materials
-from ctr_pvs.robot import Robot
+from ctr_pvs.robot.robot import Robot
 from ctr_pvs.sections import piecewise_domain
 from ctr_pvs.seed_numbers import Part
 from ctr_pvs.seed_numbers import Row

@@ -26,7 +26,7 @@ from ctr_pvs.lazy import lazy
 from ctr_pvs.materials import Materials
 from ctr_pvs.relaxed import Relaxed
 from ctr_pvs.relaxed import relaxed_state
-from ctr_pvs.robot import Robot
+from ctr_pvs.robot.robot import Robot
 from ctr_pvs.sections import piecewise_domain
 from ctr_pvs.serving import Served
 from ctr_pvs.serving import ServingModel

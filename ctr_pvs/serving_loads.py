@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from ctr_pvs.actuation import Loads
 from ctr_pvs.actuation import Motion
 from ctr_pvs.actuation import pre_curvature_at
-from ctr_pvs.robot import Segment
+from ctr_pvs.robot.robot import Segment
 from ctr_pvs.sections import ABSENT
 from ctr_pvs.serving import ServingModel
 

@@ -20,7 +20,7 @@ from ctr_pvs.models import Models
 from ctr_pvs.refine import Refined
 from ctr_pvs.refine import refine_full
 from ctr_pvs.renda2021 import check_renda2021
-from ctr_pvs.robot import Robot
+from ctr_pvs.robot.robot import Robot
 from ctr_pvs.serve import Position
 from ctr_pvs.serve import Server
 from ctr_pvs.snap import Snap

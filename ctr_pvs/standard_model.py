@@ -27,7 +27,7 @@ from scipy.integrate import solve_bvp
 from scipy.integrate import solve_ivp
 from scipy.optimize import root
 
-from ctr_pvs.robot import Robot
+from ctr_pvs.robot.robot import Robot
 from ctr_pvs.sections import SAME_PLACE
 from ctr_pvs.standard_equations import Problem
 from ctr_pvs.standard_equations import Section

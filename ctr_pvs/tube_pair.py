@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from numpy.typing import NDArray
 
 from ctr_pvs.materials import Materials
-from ctr_pvs.robot import Robot
+from ctr_pvs.robot.robot import Robot
 from ctr_pvs.sections import piecewise_domain
 
 Array = NDArray[np.float64]

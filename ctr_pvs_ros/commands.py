@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ctr_pvs import CommandError
 from ctr_pvs import Robot
-from ctr_pvs.robot import Limits
+from ctr_pvs.robot.robot import Limits
 
 
 class Reason(StrEnum):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ctr_pvs.robot import Robot
-from ctr_pvs.robot_file import load_robot
+from ctr_pvs.robot.file import load_robot
+from ctr_pvs.robot.robot import Robot
 
 GOOD = """\
 name: pair

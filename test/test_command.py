@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from ctr_pvs.errors import CommandError
-from ctr_pvs.robot import Limits
-from ctr_pvs.robot import Robot
-from ctr_pvs.robot import Segment
-from ctr_pvs.robot import Tube
+from ctr_pvs.robot.robot import Limits
+from ctr_pvs.robot.robot import Robot
+from ctr_pvs.robot.robot import Segment
+from ctr_pvs.robot.robot import Tube
 
 
 def make_robot(limits: Limits | None = None) -> Robot:

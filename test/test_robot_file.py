@@ -10,8 +10,8 @@ from robot_texts import GOOD
 from robot_texts import load_text
 from robot_texts import one_tube
 
-from ctr_pvs.robot import Limits
-from ctr_pvs.robot_file import load_robot
+from ctr_pvs.robot.file import load_robot
+from ctr_pvs.robot.robot import Limits
 
 CONFIG = Path(__file__).parent.parent / "config"
 

@@ -9,7 +9,7 @@ from robot_texts import GOOD
 from robot_texts import load_text
 
 from ctr_pvs.errors import RobotFileError
-from ctr_pvs.robot_file import load_robot
+from ctr_pvs.robot.file import load_robot
 
 OUTER, INNER = "tubes[0]", "tubes[1]"
 

@@ -7,21 +7,21 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from ctr_pvs.errors import RobotFileError
-from ctr_pvs.file_table import Table
-from ctr_pvs.robot import DIAMETER_RANGE
-from ctr_pvs.robot import LARGEST_CURVATURE
-from ctr_pvs.robot import LARGEST_TURN
-from ctr_pvs.robot import LENGTH_RANGE
-from ctr_pvs.robot import MODULUS_RANGE
-from ctr_pvs.robot import STIFFNESS_RANGE
-from ctr_pvs.robot import Limits
-from ctr_pvs.robot import Robot
-from ctr_pvs.robot import Segment
-from ctr_pvs.robot import Tube
-from ctr_pvs.robot import annulus_stiffness
-from ctr_pvs.robot import check_diameters
-from ctr_pvs.robot import shear_modulus_from_poisson
-from ctr_pvs.strict_yaml import read_yaml
+from ctr_pvs.robot.file_table import Table
+from ctr_pvs.robot.robot import DIAMETER_RANGE
+from ctr_pvs.robot.robot import LARGEST_CURVATURE
+from ctr_pvs.robot.robot import LARGEST_TURN
+from ctr_pvs.robot.robot import LENGTH_RANGE
+from ctr_pvs.robot.robot import MODULUS_RANGE
+from ctr_pvs.robot.robot import STIFFNESS_RANGE
+from ctr_pvs.robot.robot import Limits
+from ctr_pvs.robot.robot import Robot
+from ctr_pvs.robot.robot import Segment
+from ctr_pvs.robot.robot import Tube
+from ctr_pvs.robot.robot import annulus_stiffness
+from ctr_pvs.robot.robot import check_diameters
+from ctr_pvs.robot.robot import shear_modulus_from_poisson
+from ctr_pvs.robot.strict_yaml import read_yaml
 
 _MODULI = ("youngs_modulus", "shear_modulus", "poissons_ratio")
 _STIFFNESSES = ("bending_stiffness", "torsional_stiffness")

@@ -21,10 +21,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from numpy.typing import NDArray
 
-from ctr_pvs.command import LARGEST_ALPHA
-from ctr_pvs.command import CommandBounds
-from ctr_pvs.command import Range
 from ctr_pvs.errors import RobotError
+from ctr_pvs.robot.command import LARGEST_ALPHA
+from ctr_pvs.robot.command import CommandBounds
+from ctr_pvs.robot.command import Range
 
 LENGTH_RANGE = (1e-7, 1e3)  # m, of a segment; the shortest is far above the slack within which boundaries coincide
 DIAMETER_RANGE = (0.0, 10.0)  # m

@@ -12,7 +12,7 @@ from typing import Any
 
 from ctr_pvs.errors import RobotError
 from ctr_pvs.errors import RobotFileError
-from ctr_pvs.robot import number_in
+from ctr_pvs.robot.robot import number_in
 
 
 @dataclass(frozen=True)
