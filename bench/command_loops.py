@@ -17,7 +17,7 @@ from ctr_pvs import Equilibrium
 from ctr_pvs import EquilibriumSolver
 from ctr_pvs import Robot
 from ctr_pvs import Status
-from ctr_pvs.renda2021 import printed_forces
+from ctr_pvs.pvs.printed_loads import printed_forces
 from ctr_pvs.sections import SAME_PLACE
 
 Array = NDArray[np.float64]

@@ -14,21 +14,21 @@ from numpy.typing import NDArray
 
 from ctr_pvs import EquilibriumSolver
 from ctr_pvs import Robot
-from ctr_pvs.full import FullEnergy
-from ctr_pvs.full_solution import FullShape
-from ctr_pvs.full_solution import solve_full
-from ctr_pvs.full_space import FullSpace
-from ctr_pvs.full_space import StrainMaps
-from ctr_pvs.full_space import StrainSection
 from ctr_pvs.materials import Materials
 from ctr_pvs.models import Models
-from ctr_pvs.projection import projected_residual
+from ctr_pvs.pvs.energy import FullEnergy
+from ctr_pvs.pvs.projection import projected_residual
+from ctr_pvs.pvs.solution import FullShape
+from ctr_pvs.pvs.solution import solve_full
+from ctr_pvs.pvs.space import FullSpace
+from ctr_pvs.pvs.space import StrainMaps
+from ctr_pvs.pvs.space import StrainSection
+from ctr_pvs.pvs.strain_basis import PolynomialBasis
 from ctr_pvs.refine import tip_position
 from ctr_pvs.sections import piecewise_domain
 from ctr_pvs.shape import TorsionlessShape
 from ctr_pvs.shape import TorsionShape
 from ctr_pvs.solve import newton
-from ctr_pvs.strain_basis import PolynomialBasis
 
 Array = NDArray[np.float64]
 

@@ -19,8 +19,8 @@ from ctr_pvs.continuation import State
 from ctr_pvs.lazy import lazy
 from ctr_pvs.pieces import Piece
 from ctr_pvs.pieces import State as PieceState
+from ctr_pvs.pvs.printed_loads import printed_forces
 from ctr_pvs.refine import INTEGRATION_SHARE
-from ctr_pvs.renda2021 import printed_forces
 from ctr_pvs.serve import Position
 from ctr_pvs.shape import Shape
 from ctr_pvs.shape import TorsionShape

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from ctr_pvs.backbone import chain
 from ctr_pvs.backbone import position_of
-from ctr_pvs.full import FullEnergy
-from ctr_pvs.full_solution import FullSolution
-from ctr_pvs.full_solution import solve_full
+from ctr_pvs.pvs.energy import FullEnergy
+from ctr_pvs.pvs.solution import FullSolution
+from ctr_pvs.pvs.solution import solve_full
+from ctr_pvs.pvs.strain_basis import PolynomialBasis
 from ctr_pvs.shape import Shape
 from ctr_pvs.solution import TorsionSolution
-from ctr_pvs.strain_basis import PolynomialBasis
 
 Array = NDArray[np.float64]
 

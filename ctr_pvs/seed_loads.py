@@ -26,7 +26,7 @@ from typing import TypeAlias
 import numpy as np
 
 from ctr_pvs.equilibrium import Equilibrium
-from ctr_pvs.renda2021 import printed_forces
+from ctr_pvs.pvs.printed_loads import printed_forces
 from ctr_pvs.seed_numbers import PRINTED
 from ctr_pvs.seed_numbers import Part
 from ctr_pvs.seed_numbers import Row

@@ -10,10 +10,13 @@ from numpy.typing import NDArray
 
 from ctr_pvs.backbone import poses
 from ctr_pvs.equilibrium import Equilibrium
-from ctr_pvs.full import FullEnergy
-from ctr_pvs.full_solution import FullSolution
-from ctr_pvs.full_solution import solve_full
 from ctr_pvs.materials import Materials
+from ctr_pvs.pvs.energy import FullEnergy
+from ctr_pvs.pvs.solution import FullSolution
+from ctr_pvs.pvs.solution import solve_full
+from ctr_pvs.pvs.strain_basis import PolynomialBasis
+from ctr_pvs.pvs.strain_basis import ReferenceStrainBasis
+from ctr_pvs.pvs.strain_basis import StrainBasis
 from ctr_pvs.robot.robot import Robot
 from ctr_pvs.sections import piecewise_domain
 from ctr_pvs.seed_numbers import Part
@@ -27,9 +30,6 @@ from ctr_pvs.seed_robots import fig4_robot
 from ctr_pvs.shape import Shape
 from ctr_pvs.solver import EquilibriumSolver
 from ctr_pvs.status import NoEquilibriumError
-from ctr_pvs.strain_basis import PolynomialBasis
-from ctr_pvs.strain_basis import ReferenceStrainBasis
-from ctr_pvs.strain_basis import StrainBasis
 
 Array = NDArray[np.float64]
 

@@ -17,9 +17,9 @@ from ctr_pvs.equilibria import equilibria
 from ctr_pvs.equilibrium import Equilibrium
 from ctr_pvs.errors import FieldError
 from ctr_pvs.models import Models
+from ctr_pvs.pvs.printed_loads import check_renda2021
 from ctr_pvs.refine import Refined
 from ctr_pvs.refine import refine_full
-from ctr_pvs.renda2021 import check_renda2021
 from ctr_pvs.robot.robot import Robot
 from ctr_pvs.serve import Position
 from ctr_pvs.serve import Server

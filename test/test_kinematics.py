@@ -10,22 +10,22 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import logm
 
 from ctr_pvs.backbone import bishop_frames
-from ctr_pvs.full import FullEnergy
-from ctr_pvs.full_solution import FullShape
-from ctr_pvs.kinematics import Motion
-from ctr_pvs.kinematics import growing_section_twist
-from ctr_pvs.kinematics import strain_jacobian
 from ctr_pvs.materials import Materials
-from ctr_pvs.se3 import adjoint
-from ctr_pvs.se3 import coadjoint
-from ctr_pvs.se3 import hat
-from ctr_pvs.se3 import homogeneous
-from ctr_pvs.se3 import inverse
-from ctr_pvs.se3 import roll
-from ctr_pvs.se3 import small_adjoint
-from ctr_pvs.se3 import small_coadjoint
+from ctr_pvs.pvs.energy import FullEnergy
+from ctr_pvs.pvs.kinematics import Motion
+from ctr_pvs.pvs.kinematics import growing_section_twist
+from ctr_pvs.pvs.kinematics import strain_jacobian
+from ctr_pvs.pvs.se3 import adjoint
+from ctr_pvs.pvs.se3 import coadjoint
+from ctr_pvs.pvs.se3 import hat
+from ctr_pvs.pvs.se3 import homogeneous
+from ctr_pvs.pvs.se3 import inverse
+from ctr_pvs.pvs.se3 import roll
+from ctr_pvs.pvs.se3 import small_adjoint
+from ctr_pvs.pvs.se3 import small_coadjoint
+from ctr_pvs.pvs.solution import FullShape
+from ctr_pvs.pvs.strain_basis import PolynomialBasis
 from ctr_pvs.sections import piecewise_domain
-from ctr_pvs.strain_basis import PolynomialBasis
 
 BASIS = PolynomialBasis(2)
 

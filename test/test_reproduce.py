@@ -17,7 +17,8 @@ from ctr_pvs import Segment
 from ctr_pvs import Tube
 from ctr_pvs import cli
 from ctr_pvs import load_robot
-from ctr_pvs.renda2021 import printed_forces
+from ctr_pvs.pvs.printed_loads import printed_forces
+from ctr_pvs.pvs.strain_basis import PolynomialBasis
 from ctr_pvs.reproduce import Reproduction
 from ctr_pvs.reproduce import reproduce
 from ctr_pvs.reproduce import save_pictures
@@ -31,7 +32,6 @@ from ctr_pvs.seed_robots import fig4_robot
 from ctr_pvs.seed_shapes import BRANCHES
 from ctr_pvs.seed_shapes import fig2_equilibria
 from ctr_pvs.seed_shapes import theta_2
-from ctr_pvs.strain_basis import PolynomialBasis
 
 #: Rows that scripts rely on.
 NAMES = [

@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from ctr_pvs.backbone import bishop_frames
-from ctr_pvs.full import FullEnergy
-from ctr_pvs.full_solution import FullShape
-from ctr_pvs.se3 import adjoint
-from ctr_pvs.se3 import hat
-from ctr_pvs.se3 import homogeneous
-from ctr_pvs.se3 import inverse
-from ctr_pvs.se3 import roll
+from ctr_pvs.pvs.energy import FullEnergy
+from ctr_pvs.pvs.se3 import adjoint
+from ctr_pvs.pvs.se3 import hat
+from ctr_pvs.pvs.se3 import homogeneous
+from ctr_pvs.pvs.se3 import inverse
+from ctr_pvs.pvs.se3 import roll
+from ctr_pvs.pvs.solution import FullShape
 from ctr_pvs.sections import SAME_PLACE
 
 Array = NDArray[np.float64]

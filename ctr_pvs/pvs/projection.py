@@ -13,13 +13,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ctr_pvs.full import FullEnergy
-from ctr_pvs.full_space import StrainSection
-from ctr_pvs.se3 import adjoint
-from ctr_pvs.se3 import coadjoint
-from ctr_pvs.se3 import inverse
-from ctr_pvs.se3 import roll
-from ctr_pvs.se3 import small_coadjoint
+from ctr_pvs.pvs.energy import FullEnergy
+from ctr_pvs.pvs.se3 import adjoint
+from ctr_pvs.pvs.se3 import coadjoint
+from ctr_pvs.pvs.se3 import inverse
+from ctr_pvs.pvs.se3 import roll
+from ctr_pvs.pvs.se3 import small_coadjoint
+from ctr_pvs.pvs.space import StrainSection
 
 Array = NDArray[np.float64]
 

@@ -18,10 +18,10 @@ from scipy.linalg import eigh
 
 from ctr_pvs.basis import gauss_legendre
 from ctr_pvs.energy import SectionNodes
-from ctr_pvs.full_space import FullSpace
 from ctr_pvs.materials import Materials
+from ctr_pvs.pvs.space import FullSpace
+from ctr_pvs.pvs.strain_basis import StrainBasis
 from ctr_pvs.shape import Shape
-from ctr_pvs.strain_basis import StrainBasis
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]

@@ -13,7 +13,7 @@ from scipy.linalg import eigvalsh
 from ctr_pvs.actuation import Loads
 from ctr_pvs.actuation import virtual_work_loads
 from ctr_pvs.errors import FieldError
-from ctr_pvs.full import FullEnergy
+from ctr_pvs.pvs.energy import FullEnergy
 from ctr_pvs.shape import Shape
 from ctr_pvs.solution import Solution
 from ctr_pvs.solution import TorsionSolution
