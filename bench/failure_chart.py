@@ -15,7 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from methods import METHODS
 
-from ctr_pvs.two_tubes import critical_lambda
+from ctr_pvs.oracles.two_tubes import critical_lambda
 
 if TYPE_CHECKING:
     from where_methods_fail import Row

@@ -32,7 +32,7 @@ from smoothed_rod import smoothed_forces
 
 from ctr_pvs import EquilibriumSolver
 from ctr_pvs.equilibria import folds
-from ctr_pvs.two_tubes import two_tube_parameters
+from ctr_pvs.oracles.two_tubes import two_tube_parameters
 
 Array = NDArray[np.float64]
 

@@ -1,10 +1,9 @@
 """Who is right: every answer against the exact equilibria of its command.
 
-``PairJudge`` knows all equilibria of two tubes in closed form (``ctr_pvs.two_tubes``), and how many unstable directions
-each has from an integration back from the tip (``ctr_pvs.tip_curve``); neither uses the solver's energy or its path
-following.  ``FineJudge`` takes robots of three tubes: the stability of an answer is that of the energy Hessian at a
-much higher degree, and the branch is followed by steps so small that no certificate is needed.
-"""
+``PairJudge`` knows all equilibria of two tubes in closed form (``ctr_pvs.oracles.two_tubes``), and how many unstable
+directions each has from an integration back from the tip (``ctr_pvs.oracles.tip_curve``); neither uses the solver's
+energy or its path following. ``FineJudge`` takes robots of three tubes: the stability of an answer is that of the
+energy Hessian at a much higher degree, and the branch is followed by steps so small that no certificate is needed."""
 
 from __future__ import annotations
 
@@ -21,10 +20,10 @@ from ctr_pvs import Robot
 from ctr_pvs.equilibria import stationary
 from ctr_pvs.equilibria import tip_curve
 from ctr_pvs.models import Models
+from ctr_pvs.oracles.standard_model import AngleField
+from ctr_pvs.oracles.two_tubes import two_tube_parameters
 from ctr_pvs.solve import twist_size
 from ctr_pvs.stability import stability_margin
-from ctr_pvs.standard_model import AngleField
-from ctr_pvs.two_tubes import two_tube_parameters
 
 Array = NDArray[np.float64]
 

@@ -21,11 +21,11 @@ from ctr_pvs import EquilibriumSolver
 from ctr_pvs import Robot
 from ctr_pvs import Status
 from ctr_pvs.models import Models
+from ctr_pvs.oracles.standard_model import AngleField
+from ctr_pvs.oracles.standard_model import StandardSolution
+from ctr_pvs.oracles.standard_model import solve_standard_bvp
+from ctr_pvs.oracles.standard_model import solve_standard_shooting
 from ctr_pvs.shape import TorsionShape
-from ctr_pvs.standard_model import AngleField
-from ctr_pvs.standard_model import StandardSolution
-from ctr_pvs.standard_model import solve_standard_bvp
-from ctr_pvs.standard_model import solve_standard_shooting
 
 Array = NDArray[np.float64]
 

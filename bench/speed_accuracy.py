@@ -38,7 +38,7 @@ from speed_scenes import Scene
 from speed_scenes import scenes
 
 from ctr_pvs import EquilibriumSolver
-from ctr_pvs.standard_model import solve_standard_bvp
+from ctr_pvs.oracles.standard_model import solve_standard_bvp
 
 Array = NDArray[np.float64]
 

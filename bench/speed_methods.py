@@ -21,9 +21,9 @@ from seeds_way import SeedsWay
 from speed_scenes import Scene
 
 from ctr_pvs import EquilibriumSolver
-from ctr_pvs.standard_model import StandardSolution
-from ctr_pvs.standard_model import solve_standard_bvp
-from ctr_pvs.standard_model import solve_standard_shooting
+from ctr_pvs.oracles.standard_model import StandardSolution
+from ctr_pvs.oracles.standard_model import solve_standard_bvp
+from ctr_pvs.oracles.standard_model import solve_standard_shooting
 
 Array = NDArray[np.float64]
 

@@ -30,12 +30,12 @@ from ctr_pvs.continuation import State
 from ctr_pvs.equilibria import equilibria
 from ctr_pvs.equilibria import folds
 from ctr_pvs.models import Models
+from ctr_pvs.oracles.two_tubes import TwoTubes
+from ctr_pvs.oracles.two_tubes import stability_function
 from ctr_pvs.shape import Shape
 from ctr_pvs.shape import TorsionShape
 from ctr_pvs.solve import newton
 from ctr_pvs.stability import stability_margin
-from ctr_pvs.two_tubes import TwoTubes
-from ctr_pvs.two_tubes import stability_function
 
 Array = NDArray[np.float64]
 

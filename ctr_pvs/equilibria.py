@@ -21,6 +21,12 @@ from ctr_pvs.equilibrium import Equilibrium
 from ctr_pvs.errors import FieldError
 from ctr_pvs.models import Models
 from ctr_pvs.multistart import search
+from ctr_pvs.oracles.tip_curve import DEPTH
+from ctr_pvs.oracles.tip_curve import PairFold
+from ctr_pvs.oracles.tip_curve import TipCurve
+from ctr_pvs.oracles.tube_pair import TubePair
+from ctr_pvs.oracles.tube_pair import materials_at
+from ctr_pvs.oracles.tube_pair import tube_pair
 from ctr_pvs.refine import INTEGRATION_SHARE
 from ctr_pvs.refine import LOOSER
 from ctr_pvs.refine import tip_position
@@ -29,12 +35,6 @@ from ctr_pvs.solution import TorsionSolution
 from ctr_pvs.solve import residual_limit
 from ctr_pvs.solve import twist_size
 from ctr_pvs.status import Status
-from ctr_pvs.tip_curve import DEPTH
-from ctr_pvs.tip_curve import PairFold
-from ctr_pvs.tip_curve import TipCurve
-from ctr_pvs.tube_pair import TubePair
-from ctr_pvs.tube_pair import materials_at
-from ctr_pvs.tube_pair import tube_pair
 from ctr_pvs.twist import TorqueField
 
 Array = NDArray[np.float64]

@@ -13,7 +13,7 @@ import pytest
 from ctr_pvs import cli
 from ctr_pvs import load_robot
 from ctr_pvs.equilibria import equilibria
-from ctr_pvs.two_tubes import two_tube_parameters
+from ctr_pvs.oracles.two_tubes import two_tube_parameters
 
 ROOT = Path(__file__).parent.parent
 ROBOT = str(ROOT / "config" / "renda2021.yaml")

@@ -20,9 +20,9 @@ from ctr_pvs.equilibria import equilibria
 from ctr_pvs.equilibria import folds
 from ctr_pvs.equilibria import tip_curve
 from ctr_pvs.errors import FieldError
+from ctr_pvs.oracles.tip_curve import TURN
+from ctr_pvs.oracles.two_tubes import two_tube_parameters
 from ctr_pvs.seed_robots import fig2_robot
-from ctr_pvs.tip_curve import TURN
-from ctr_pvs.two_tubes import two_tube_parameters
 
 STRAIGHT = Segment(0.03, 0.03, 0.02)
 FULL, PARTIAL = (0.0935, 0.2085), (0.0935, 0.1705)

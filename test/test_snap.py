@@ -16,7 +16,7 @@ from ctr_pvs import Segment
 from ctr_pvs import Status
 from ctr_pvs import Tube
 from ctr_pvs.models import Models
-from ctr_pvs.two_tubes import TwoTubes
+from ctr_pvs.oracles.two_tubes import TwoTubes
 
 FULL, PARTIAL = [0.0935, 0.2085], [0.0935, 0.1705]
 

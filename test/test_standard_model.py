@@ -19,13 +19,13 @@ from ctr_pvs import Robot
 from ctr_pvs import Segment
 from ctr_pvs import Tube
 from ctr_pvs import load_robot
-from ctr_pvs import standard_model
-from ctr_pvs.standard_model import Collocation
-from ctr_pvs.standard_model import Problem
-from ctr_pvs.standard_model import Shooting
-from ctr_pvs.standard_model import StandardSolution
-from ctr_pvs.standard_model import solve_standard_bvp
-from ctr_pvs.standard_model import solve_standard_shooting
+from ctr_pvs.oracles import standard_model
+from ctr_pvs.oracles.standard_model import Collocation
+from ctr_pvs.oracles.standard_model import Problem
+from ctr_pvs.oracles.standard_model import Shooting
+from ctr_pvs.oracles.standard_model import StandardSolution
+from ctr_pvs.oracles.standard_model import solve_standard_bvp
+from ctr_pvs.oracles.standard_model import solve_standard_shooting
 
 FIG2 = "renda2021_fig2.yaml"
 
@@ -261,10 +261,11 @@ def test_it_stands_apart_from_the_solver_it_checks():
     """It uses robot, sections and materials only, and what the package serves does not load it."""
     used = set()
     for name in ("standard_model", "standard_equations"):
-        for node in ast.walk(ast.parse((ROOT / "ctr_pvs" / f"{name}.py").read_text())):
+        for node in ast.walk(ast.parse((ROOT / "ctr_pvs" / "oracles" / f"{name}.py").read_text())):
             if isinstance(node, ast.ImportFrom) and node.module.startswith("ctr_pvs"):
                 used.add(node.module)
             assert not (isinstance(node, ast.Import) and any(alias.name.startswith("ctr_pvs") for alias in node.names))
-    assert used == {f"ctr_pvs.{name}" for name in ("robot", "sections", "materials", "standard_equations")}
+    names = ("robot.robot", "sections", "materials", "oracles.standard_equations")
+    assert used == {f"ctr_pvs.{name}" for name in names}
     code = "import sys, ctr_pvs; assert not [name for name in sys.modules if 'standard_' in name]"
     assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=False).returncode == 0

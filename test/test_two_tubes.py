@@ -20,12 +20,12 @@ from ctr_pvs import Tube
 from ctr_pvs.energy import TorsionEnergy
 from ctr_pvs.errors import FieldError
 from ctr_pvs.models import Models
+from ctr_pvs.oracles.two_tubes import TwoTubes
+from ctr_pvs.oracles.two_tubes import _jacobi
+from ctr_pvs.oracles.two_tubes import critical_lambda
+from ctr_pvs.oracles.two_tubes import stability_function
+from ctr_pvs.oracles.two_tubes import two_tube_parameters
 from ctr_pvs.seed_robots import fig2_robot
-from ctr_pvs.two_tubes import TwoTubes
-from ctr_pvs.two_tubes import _jacobi
-from ctr_pvs.two_tubes import critical_lambda
-from ctr_pvs.two_tubes import stability_function
-from ctr_pvs.two_tubes import two_tube_parameters
 
 CRITICAL = {
     0.0: 2.4674011003,

@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from ctr_pvs.tube_pair import PairSection
-from ctr_pvs.tube_pair import TubePair
+from ctr_pvs.oracles.tube_pair import PairSection
+from ctr_pvs.oracles.tube_pair import TubePair
 from ctr_pvs.twist import TorqueField
 from ctr_pvs.twist import TwistSpace
 from ctr_pvs.unknowns import CONSTANT

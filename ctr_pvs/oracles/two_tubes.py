@@ -35,10 +35,10 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from ctr_pvs.errors import FieldError
+from ctr_pvs.oracles.tube_pair import TubePair
+from ctr_pvs.oracles.tube_pair import materials_at
+from ctr_pvs.oracles.tube_pair import tube_pair
 from ctr_pvs.robot.robot import Robot
-from ctr_pvs.tube_pair import TubePair
-from ctr_pvs.tube_pair import materials_at
-from ctr_pvs.tube_pair import tube_pair
 
 Array = NDArray[np.float64]
 
