@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from ctr_pvs import Equilibrium
 from ctr_pvs import EquilibriumSolver
 from ctr_pvs import Robot
-from ctr_pvs.seed_loads import TABLE2
-from ctr_pvs.seed_numbers import PRINTED
-from ctr_pvs.seed_robots import curved_robot
-from ctr_pvs.seed_robots import fig4_robot
+from ctr_pvs.renda2021.loads import TABLE2
+from ctr_pvs.renda2021.numbers import PRINTED
+from ctr_pvs.renda2021.robots import curved_robot
+from ctr_pvs.renda2021.robots import fig4_robot
 
 Array = NDArray[np.float64]
 

@@ -26,13 +26,13 @@ from ctr_pvs.cli_words import number
 from ctr_pvs.cli_words import whole_number
 from ctr_pvs.errors import FieldError
 from ctr_pvs.errors import RobotFileError
-from ctr_pvs.figures import PictureError
+from ctr_pvs.renda2021.figures import PictureError
+from ctr_pvs.renda2021.reproduce import as_json
+from ctr_pvs.renda2021.reproduce import as_text
+from ctr_pvs.renda2021.reproduce import reproduce
+from ctr_pvs.renda2021.reproduce import save_pictures
 from ctr_pvs.report import answer_as_json
 from ctr_pvs.report import answer_as_text
-from ctr_pvs.reproduce import as_json
-from ctr_pvs.reproduce import as_text
-from ctr_pvs.reproduce import reproduce
-from ctr_pvs.reproduce import save_pictures
 
 SUCCESS = 0
 BAD_INPUT = 2

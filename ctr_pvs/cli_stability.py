@@ -12,7 +12,7 @@ import numpy as np
 from ctr_pvs.cli_words import UsageError
 from ctr_pvs.cli_words import number
 from ctr_pvs.cli_words import whole_number
-from ctr_pvs.figures import PictureError
+from ctr_pvs.renda2021.figures import PictureError
 from ctr_pvs.robot.file import load_robot
 from ctr_pvs.robot.robot import Robot
 from ctr_pvs.stability_figures import save_pictures

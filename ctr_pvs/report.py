@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ctr_pvs.backbone import Pose
 from ctr_pvs.equilibrium import Equilibrium
+from ctr_pvs.renda2021.columns import aligned
 from ctr_pvs.robot.robot import Robot
 from ctr_pvs.status import NoEquilibriumError
 
@@ -139,18 +140,6 @@ def _rows(robot: Robot, equilibrium: Equilibrium, degrees: bool) -> list[list[st
             row += [_fixed(end, 4) for end in equilibrium.force_interval[index]]
         rows.append(row)
     return rows
-
-
-def aligned(*rows: list[str]) -> list[str]:
-    """Lines with columns as wide as their widest cell; the first column left, the others right."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return [
-        "  ".join(
-            cell.rjust(width) if index else cell.ljust(width)
-            for index, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in rows
-    ]
 
 
 def _components(names: str, values: NDArray[np.float64], decimals: int) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ctr_pvs.figures import empty_figure
+from ctr_pvs.renda2021.figures import empty_figure
 from ctr_pvs.stability_scan import Scan
 from ctr_pvs.stability_scan import SweepSnap
 

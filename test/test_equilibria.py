@@ -22,7 +22,7 @@ from ctr_pvs.equilibria import tip_curve
 from ctr_pvs.errors import FieldError
 from ctr_pvs.oracles.tip_curve import TURN
 from ctr_pvs.oracles.two_tubes import two_tube_parameters
-from ctr_pvs.seed_robots import fig2_robot
+from ctr_pvs.renda2021.robots import fig2_robot
 
 STRAIGHT = Segment(0.03, 0.03, 0.02)
 FULL, PARTIAL = (0.0935, 0.2085), (0.0935, 0.1705)

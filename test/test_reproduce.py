@@ -19,19 +19,19 @@ from ctr_pvs import cli
 from ctr_pvs import load_robot
 from ctr_pvs.pvs.printed_loads import printed_forces
 from ctr_pvs.pvs.strain_basis import PolynomialBasis
-from ctr_pvs.reproduce import Reproduction
-from ctr_pvs.reproduce import reproduce
-from ctr_pvs.reproduce import save_pictures
-from ctr_pvs.seed_loads import TABLE2
-from ctr_pvs.seed_loads import related_force
-from ctr_pvs.seed_loads import related_torque
-from ctr_pvs.seed_numbers import PRINTED
-from ctr_pvs.seed_robots import INNER
-from ctr_pvs.seed_robots import fig2_robot
-from ctr_pvs.seed_robots import fig4_robot
-from ctr_pvs.seed_shapes import BRANCHES
-from ctr_pvs.seed_shapes import fig2_equilibria
-from ctr_pvs.seed_shapes import theta_2
+from ctr_pvs.renda2021.loads import TABLE2
+from ctr_pvs.renda2021.loads import related_force
+from ctr_pvs.renda2021.loads import related_torque
+from ctr_pvs.renda2021.numbers import PRINTED
+from ctr_pvs.renda2021.reproduce import Reproduction
+from ctr_pvs.renda2021.reproduce import reproduce
+from ctr_pvs.renda2021.reproduce import save_pictures
+from ctr_pvs.renda2021.robots import INNER
+from ctr_pvs.renda2021.robots import fig2_robot
+from ctr_pvs.renda2021.robots import fig4_robot
+from ctr_pvs.renda2021.shapes import BRANCHES
+from ctr_pvs.renda2021.shapes import fig2_equilibria
+from ctr_pvs.renda2021.shapes import theta_2
 
 #: Rows that scripts rely on.
 NAMES = [

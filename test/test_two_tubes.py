@@ -25,7 +25,7 @@ from ctr_pvs.oracles.two_tubes import _jacobi
 from ctr_pvs.oracles.two_tubes import critical_lambda
 from ctr_pvs.oracles.two_tubes import stability_function
 from ctr_pvs.oracles.two_tubes import two_tube_parameters
-from ctr_pvs.seed_robots import fig2_robot
+from ctr_pvs.renda2021.robots import fig2_robot
 
 CRITICAL = {
     0.0: 2.4674011003,

@@ -7,17 +7,17 @@ import textwrap
 from dataclasses import dataclass
 from pathlib import Path
 
-from ctr_pvs.figures import save_fig2
-from ctr_pvs.figures import save_fig4
-from ctr_pvs.report import aligned
-from ctr_pvs.seed_loads import table2
-from ctr_pvs.seed_numbers import Part
-from ctr_pvs.seed_numbers import Row
-from ctr_pvs.seed_shapes import Branch
-from ctr_pvs.seed_shapes import Sweep
-from ctr_pvs.seed_shapes import eq31
-from ctr_pvs.seed_shapes import fig2
-from ctr_pvs.seed_shapes import fig4
+from ctr_pvs.renda2021.columns import aligned
+from ctr_pvs.renda2021.figures import save_fig2
+from ctr_pvs.renda2021.figures import save_fig4
+from ctr_pvs.renda2021.loads import table2
+from ctr_pvs.renda2021.numbers import Part
+from ctr_pvs.renda2021.numbers import Row
+from ctr_pvs.renda2021.shapes import Branch
+from ctr_pvs.renda2021.shapes import Sweep
+from ctr_pvs.renda2021.shapes import eq31
+from ctr_pvs.renda2021.shapes import fig2
+from ctr_pvs.renda2021.shapes import fig4
 
 INTRODUCTION = (
     'F. Renda, C. Messer, D. C. Rucker, F. Boyer, "A Sliding-rod Variable-strain Model for Concentric Tube Robots", '

@@ -27,14 +27,14 @@ import numpy as np
 
 from ctr_pvs.equilibrium import Equilibrium
 from ctr_pvs.pvs.printed_loads import printed_forces
-from ctr_pvs.seed_numbers import PRINTED
-from ctr_pvs.seed_numbers import Part
-from ctr_pvs.seed_numbers import Row
-from ctr_pvs.seed_numbers import row
-from ctr_pvs.seed_robots import INNER
-from ctr_pvs.seed_robots import OUTER
-from ctr_pvs.seed_robots import curved_robot
-from ctr_pvs.seed_shapes import solved
+from ctr_pvs.renda2021.numbers import PRINTED
+from ctr_pvs.renda2021.numbers import Part
+from ctr_pvs.renda2021.numbers import Row
+from ctr_pvs.renda2021.numbers import row
+from ctr_pvs.renda2021.robots import INNER
+from ctr_pvs.renda2021.robots import OUTER
+from ctr_pvs.renda2021.robots import curved_robot
+from ctr_pvs.renda2021.shapes import solved
 from ctr_pvs.solver import EquilibriumSolver
 
 Stiffness: TypeAlias = tuple[float, float]

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ctr_pvs.seed_shapes import Branch
-from ctr_pvs.seed_shapes import Sweep
+from ctr_pvs.renda2021.shapes import Branch
+from ctr_pvs.renda2021.shapes import Sweep
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
