@@ -28,7 +28,7 @@ setup(
     zip_safe=True,
     entry_points={
         "console_scripts": [
-            "ctr-pvs = ctr_pvs.cli:main",
+            "ctr-pvs = ctr_pvs.cli.main:main",
             "equilibrium_node = ctr_pvs_ros.node:main",
             "sweep_demo = ctr_pvs_ros.demo:main",
         ],

@@ -2,6 +2,6 @@
 
 import sys
 
-from ctr_pvs.cli import main
+from ctr_pvs.cli.main import main
 
 sys.exit(main())

@@ -15,8 +15,8 @@ import pytest
 
 from ctr_pvs import EquilibriumSolver
 from ctr_pvs import Status
-from ctr_pvs import cli
 from ctr_pvs import load_robot
+from ctr_pvs.cli import main as cli
 
 ROOT = Path(__file__).parent.parent
 ROBOT = str(ROOT / "config" / "renda2021.yaml")

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ctr_pvs import cli
 from ctr_pvs import load_robot
+from ctr_pvs.cli import main as cli
 from ctr_pvs.equilibria import equilibria
 from ctr_pvs.oracles.two_tubes import two_tube_parameters
 
@@ -162,7 +162,7 @@ def test_pictures(capsys, tmp_path):
 def test_matplotlib_is_loaded_only_to_draw():
     program = f"""
 import sys
-from ctr_pvs.cli import main
+from ctr_pvs.cli.main import main
 main(["stability", {ROBOT!r}, "--D", "0.0935", "0.2085", "--steps", "2", "--json"])
 assert "matplotlib" not in sys.modules
 """

@@ -9,17 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from ctr_pvs.cli_words import UsageError
-from ctr_pvs.cli_words import number
-from ctr_pvs.cli_words import whole_number
+from ctr_pvs.cli.stability_figures import save_pictures
+from ctr_pvs.cli.stability_report import scan_as_json
+from ctr_pvs.cli.stability_report import scan_as_text
+from ctr_pvs.cli.stability_scan import Scene
+from ctr_pvs.cli.stability_scan import scan
+from ctr_pvs.cli.words import UsageError
+from ctr_pvs.cli.words import number
+from ctr_pvs.cli.words import whole_number
 from ctr_pvs.renda2021.figures import PictureError
 from ctr_pvs.robot.file import load_robot
 from ctr_pvs.robot.robot import Robot
-from ctr_pvs.stability_figures import save_pictures
-from ctr_pvs.stability_report import scan_as_json
-from ctr_pvs.stability_report import scan_as_text
-from ctr_pvs.stability_scan import Scene
-from ctr_pvs.stability_scan import scan
 
 SUCCESS, NOT_ALL_SOLVED = 0, 4
 MOST_STEPS, MOST_ROWS = 10_000, 1_000

@@ -15,15 +15,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from ctr_pvs import Equilibrium
-from ctr_pvs import EquilibriumSolver
-from ctr_pvs import Status
-from ctr_pvs import load_robot
-from ctr_pvs.cli_stability import declare_stability
-from ctr_pvs.cli_words import UsageError
-from ctr_pvs.cli_words import is_number
-from ctr_pvs.cli_words import number
-from ctr_pvs.cli_words import whole_number
+from ctr_pvs.cli.report import answer_as_json
+from ctr_pvs.cli.report import answer_as_text
+from ctr_pvs.cli.stability import declare_stability
+from ctr_pvs.cli.words import UsageError
+from ctr_pvs.cli.words import is_number
+from ctr_pvs.cli.words import number
+from ctr_pvs.cli.words import whole_number
+from ctr_pvs.equilibrium import Equilibrium
 from ctr_pvs.errors import FieldError
 from ctr_pvs.errors import RobotFileError
 from ctr_pvs.renda2021.figures import PictureError
@@ -31,8 +30,9 @@ from ctr_pvs.renda2021.reproduce import as_json
 from ctr_pvs.renda2021.reproduce import as_text
 from ctr_pvs.renda2021.reproduce import reproduce
 from ctr_pvs.renda2021.reproduce import save_pictures
-from ctr_pvs.report import answer_as_json
-from ctr_pvs.report import answer_as_text
+from ctr_pvs.robot.file import load_robot
+from ctr_pvs.solver import EquilibriumSolver
+from ctr_pvs.status import Status
 
 SUCCESS = 0
 BAD_INPUT = 2

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from ctr_pvs.cli.stability_scan import Scan
 from ctr_pvs.oracles.two_tubes import critical_lambda
 from ctr_pvs.renda2021.columns import aligned
-from ctr_pvs.stability_scan import Scan
 
 #: Rows of the sweep that the text shows at most; JSON has all.
 SHOWN = 25

@@ -1,0 +1,3 @@
+"""The command line: its words, and its answers as text, JSON and pictures.
+
+May use all other rooms; none uses it."""
