@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from oracles import integrate_rod
-from oracles import rolls
+from judges_of_shape import integrate_rod
+from judges_of_shape import rolls
 from random_robots import random_D
 from random_robots import random_robot
 from scipy.spatial.transform import Rotation

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from oracles import base_angles
+from judges_of_shape import base_angles
 from random_robots import random_D
 from random_robots import random_robot
 

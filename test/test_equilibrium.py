@@ -7,8 +7,8 @@ import time
 import numpy as np
 import pytest
 from conftest import ROOT
-from oracles import base_angles
-from oracles import tip_position
+from judges_of_shape import base_angles
+from judges_of_shape import tip_position
 from random_robots import random_D
 from random_robots import random_robot
 

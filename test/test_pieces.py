@@ -8,8 +8,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from oracles import integrate_rod
-from oracles import rolls
+from judges_of_shape import integrate_rod
+from judges_of_shape import rolls
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 

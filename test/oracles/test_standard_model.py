@@ -9,7 +9,7 @@ import sys
 import numpy as np
 import pytest
 from conftest import ROOT
-from oracles import tip_position
+from judges_of_shape import tip_position
 from random_robots import random_D
 from random_robots import random_robot
 

@@ -15,7 +15,7 @@ from ctr_pvs.cli import main as cli
 from ctr_pvs.equilibria import equilibria
 from ctr_pvs.oracles.two_tubes import two_tube_parameters
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 ROBOT = str(ROOT / "config" / "renda2021.yaml")
 FIG2 = str(ROOT / "config" / "renda2021_fig2.yaml")
 THREE_TUBES = str(ROOT / "config" / "three_tubes.yaml")

@@ -13,7 +13,7 @@ from robot_texts import one_tube
 from ctr_pvs.robot.file import load_robot
 from ctr_pvs.robot.robot import Limits
 
-CONFIG = Path(__file__).parent.parent / "config"
+CONFIG = Path(__file__).parents[2] / "config"
 
 
 def test_renda2021_is_table_1_and_figure_3():

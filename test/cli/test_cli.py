@@ -18,7 +18,7 @@ from ctr_pvs import Status
 from ctr_pvs import load_robot
 from ctr_pvs.cli import main as cli
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 ROBOT = str(ROOT / "config" / "renda2021.yaml")
 THREE_TUBES = str(ROOT / "config" / "three_tubes.yaml")
 REFERENCE = json.loads((ROOT / "test" / "data" / "reference_values.json").read_text())
