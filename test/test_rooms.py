@@ -1,0 +1,170 @@
+"""The package is a house of rooms, one above the other: a room uses what is below it, never what is above."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).parents[1] / "ctr_pvs"
+#: From the ground up.
+ROOMS = ("errors", "robot", "model", "kernel", "pvs", "answer", "oracles", "solve", "tasks", "renda2021", "cli")
+#: Without scipy: what they compute is plain numpy.
+PLAIN = ("robot", "model", "kernel")
+#: Modules outside the rooms that stay there.
+FRONT = {"__init__", "__main__", "errors"}
+#: Modules that have no room yet: they may use every room, and every room may use them. One that moves leaves this list.
+NOT_YET_MOVED = {
+    "actuation",
+    "backbone",
+    "backbone_cuts",
+    "backbone_plan",
+    "basis",
+    "batch",
+    "batch_backbone",
+    "batch_group",
+    "batch_layout",
+    "batch_linear",
+    "batch_pilots",
+    "batch_relaxed",
+    "batch_sort",
+    "batch_state",
+    "batch_tables",
+    "batch_values",
+    "batch_walk",
+    "collocation",
+    "composition",
+    "continuation",
+    "convexity",
+    "energy",
+    "equilibria",
+    "equilibrium",
+    "fidelity",
+    "jacobian",
+    "lazy",
+    "materials",
+    "models",
+    "multistart",
+    "pair_form",
+    "pieces",
+    "pose_plan",
+    "refine",
+    "relaxed",
+    "sections",
+    "sensitivity",
+    "serve",
+    "serving",
+    "serving_loads",
+    "shape",
+    "snap",
+    "solution",
+    "solve",
+    "solver",
+    "stability",
+    "status",
+    "swing",
+    "travel",
+    "twist",
+    "unknowns",
+}
+LONGEST = 350  # lines
+FULLEST = 12  # modules in a room, beside __init__
+
+
+def modules() -> list[Path]:
+    return sorted(PACKAGE.rglob("*.py"))
+
+
+def room_of(path: Path) -> str | None:
+    """The room that a module is in; None for the ground floor."""
+    parts = path.relative_to(PACKAGE).parts
+    return parts[0] if len(parts) > 1 else None
+
+
+def imports(source: str) -> Iterator[str]:
+    """All modules that a source imports, at the top of it or within functions; ``a.b`` for ``from a import b`` too,
+    where b may be a module or a name in one."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = "." * node.level + (node.module or "")
+            yield from (f"{base}.{alias.name}" for alias in node.names)
+
+
+def forbidden(room: str, source: str) -> list[str]:
+    """What a module in ``room`` imports from the package although it may not."""
+    allowed = {*ROOMS[: ROOMS.index(room) + 1], *NOT_YET_MOVED}
+    wrong = []
+    for name in imports(source):
+        top, _, rest = name.partition(".")
+        relative = not top  # one import has one spelling here, from the top
+        if relative or (top == PACKAGE.name and rest.partition(".")[0] not in allowed):
+            wrong.append(name)
+    return wrong
+
+
+def of(paths: list[Path]) -> pytest.MarkDecorator:
+    return pytest.mark.parametrize("path", paths, ids=lambda path: str(path.relative_to(PACKAGE)))
+
+
+@of([path for path in modules() if room_of(path)])
+def test_imports_go_down_only(path):
+    assert room_of(path) in ROOMS
+    assert forbidden(room_of(path), path.read_text(encoding="utf-8")) == []
+
+
+def test_errors_stand_on_nothing():
+    assert forbidden("errors", (PACKAGE / "errors.py").read_text(encoding="utf-8")) == []
+
+
+@pytest.mark.parametrize(
+    ("source", "wrong"),
+    [
+        ("from ctr_pvs.errors import RobotError", False),
+        ("from ctr_pvs.pvs.energy import FullEnergy", False),
+        ("from ctr_pvs.robot import file", False),
+        ("import numpy", False),
+        ("from ctr_pvs.cli.main import main", True),
+        ("from ctr_pvs import cli", True),
+        ("import ctr_pvs.oracles.two_tubes as pair", True),
+        ("import ctr_pvs", True),
+        ("from ctr_pvs import EquilibriumSolver", True),
+        ("from . import energy", True),
+        ("from ..cli import main", True),
+        ("def f():\n    from ctr_pvs.renda2021.robots import fig2_robot", True),
+    ],
+)
+def test_a_way_up_is_seen(source, wrong):
+    assert bool(forbidden("pvs", source)) is wrong
+
+
+def test_the_ground_floor_holds_what_stays_there_and_what_has_not_moved_yet():
+    assert {path.stem for path in PACKAGE.glob("*.py")} == FRONT | NOT_YET_MOVED
+    assert not FRONT & NOT_YET_MOVED
+
+
+@of(modules())
+def test_no_module_imports_the_node_or_ros(path):
+    tops = {name.partition(".")[0] for name in imports(path.read_text(encoding="utf-8"))}
+    assert not tops & {"ctr_pvs_ros", "ctr_pvs_interfaces", "rclpy"}
+
+
+@of([path for path in modules() if room_of(path) in PLAIN])
+def test_plain_rooms_do_without_scipy(path):
+    assert not [name for name in imports(path.read_text(encoding="utf-8")) if name.partition(".")[0] == "scipy"]
+
+
+def test_no_module_is_long_and_no_room_is_full():
+    lines = {str(path.relative_to(PACKAGE)): len(path.read_text(encoding="utf-8").splitlines()) for path in modules()}
+    assert {name: count for name, count in lines.items() if count > LONGEST} == {}
+    rooms = [room_of(path) for path in modules() if path.name != "__init__.py"]
+    assert {room: rooms.count(room) for room in rooms if room and rooms.count(room) > FULLEST} == {}
+
+
+def test_every_room_says_what_is_in_it_and_holds_nothing_else():
+    for path in PACKAGE.glob("*/__init__.py"):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        assert ast.get_docstring(tree) and len(tree.body) == 1, path.parent.name
