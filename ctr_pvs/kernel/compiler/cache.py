@@ -82,10 +82,10 @@ def places() -> Iterator[Place]:
     if named := os.environ.get("NUMBA_CACHE_DIR"):
         yield Place(Path(named).absolute(), f"{name}-", True)
         return
-    base = Path(os.environ.get("XDG_CACHE_HOME") or "")
-    if not base.is_absolute():
-        base = Path(os.path.expanduser("~")) / ".cache"
-    if base.is_absolute():  # not so where the user has no home
+    base, home = Path(os.environ.get("XDG_CACHE_HOME") or ""), Path(os.path.expanduser("~"))
+    if not base.is_absolute() and home.is_absolute() and home != Path("/"):  # else the user has no home
+        base = home / ".cache"
+    if base.is_absolute():
         yield Place(base / name, "", False)
     if sys.prefix != sys.base_prefix:
         yield Place(Path(sys.prefix) / "var" / "cache" / name, "", False)

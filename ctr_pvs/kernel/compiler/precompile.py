@@ -131,9 +131,9 @@ def _fill(folder: Path) -> None:
                 _feed(worker, waiting.pop(0).name)
             while done < total:
                 for ready, _ in selector.select():
-                    name, seconds = _answer(ready.data)
+                    told = _answer(ready.data)
                     done += 1
-                    print(f"  {done} of {total}: {name}, {seconds:.1f} s", file=sys.stderr, flush=True)
+                    print(f"  {done} of {total}: {told}", file=sys.stderr, flush=True)
                     if waiting:
                         _feed(ready.data, waiting.pop(0).name)
                     else:
@@ -150,16 +150,18 @@ def _feed(worker: subprocess.Popen[str], name: str) -> None:
     worker.stdin.write(f"{name}\n")
 
 
-def _answer(worker: subprocess.Popen[str]) -> tuple[str, float]:
-    """The entry point that ``worker`` has compiled, and how long that took [s]."""
+def _answer(worker: subprocess.Popen[str]) -> str:
+    """The entry point that ``worker`` has compiled, and how long that took."""
     assert worker.stdout is not None
     line = worker.stdout.readline()
     if not line:
         raise CompilingError(f"a process that compiled ended with code {worker.wait()}")
     answer = json.loads(line)
-    if answer["error"] is not None:
-        raise CompilingError(f"{answer['name']}: {answer['error']}")
-    return answer["name"], answer["seconds"]
+    name, error = answer["name"].rpartition(".")[2], answer["error"]
+    if error is not None:
+        print(error, file=sys.stderr, flush=True)  # all of it: Numba points at the line of source
+        raise CompilingError(f"{name}: {' '.join(error.split())[:300]}")
+    return f"{name}, {answer['seconds']:.1f} s"
 
 
 @contextmanager
