@@ -13,7 +13,7 @@ from ctr_pvs.kernel.compiler import switch
 from ctr_pvs.kernel.compiler.child import spawn
 
 #: The child cleans up and ends by itself within the first [s]; then it is killed.
-PATIENCE = 0.5
+PATIENCE = 0.7
 LOOK = 0.01
 
 

@@ -22,7 +22,7 @@ from pathlib import Path
 
 #: The package whose sources count (``ctr_pvs.kernel``), and its folder.
 PACKAGE = (__package__ or "").rpartition(".")[0]
-SOURCES = Path(__file__).resolve().parents[1]
+SOURCES = Path(__file__).absolute().parents[1]
 #: Written last: what carries it is complete.  Its time tells when the folder was last used.
 MARKER = "COMPLETE"
 DAY = 86400.0  # s
@@ -57,7 +57,7 @@ def key() -> str:
     import numpy
 
     told = [
-        str(SOURCES),  # Numba's own index goes by the path of a source
+        str(SOURCES),  # Numba's own index goes by the path of a source, links in it not followed
         sys.version,
         sys.implementation.cache_tag,
         platform.machine(),

@@ -50,10 +50,10 @@ class Stopped(BaseException):
 
 
 def main(words: list[str] | None = None) -> int:
-    """Compile the kernels, unless it is done; 0 if they can be loaded afterwards, else 1, 128 + n after signal n."""
+    """Compile the kernels, unless it is done; 0 if they can be loaded afterwards, else 1.  A signal ends it."""
     parser = argparse.ArgumentParser(prog=switch.command(), description="Compile the kernels, once for these sources.")
-    parser.add_argument("--where", action="store_true", help="only print the folder they lie in; 1 if they do not")
-    parser.add_argument("--remove", action="store_true", help="only remove what was compiled from these sources")
+    parser.add_argument("--where", action="store_true", help="only print the folder they lie in; code 1 without one")
+    parser.add_argument("--remove", action="store_true", help="only remove that folder, and print which it was")
     # Between processes of this package:
     parser.add_argument("--worker", type=Path, metavar="FOLDER", help=argparse.SUPPRESS)
     parser.add_argument("--beside", type=int, metavar="PROCESS", help=argparse.SUPPRESS)
@@ -73,15 +73,18 @@ def main(words: list[str] | None = None) -> int:
         print(f"kernels could not be compiled: {error}")
         return 1
     except Stopped as stop:
-        print("compiling the kernels was stopped")
-        return 128 + stop.number
+        print("compiling the kernels was stopped", flush=True)
+        signal.signal(stop.number, signal.SIG_DFL)  # a shell script that called this stops with it
+        signal.raise_signal(stop.number)
+        return 1
 
 
 def _found(remove: bool) -> int:
+    """Print the folder of what is compiled, if it is, and remove it if asked to; the exit code."""
     key = switch.loaded_key()
     folder = None if key is None else cache.find(key)[0]
     if folder is None:
-        return 1
+        return 0 if remove else 1
     if remove:
         shutil.rmtree(folder)
     print(folder)
@@ -186,7 +189,11 @@ def _only_one(place: cache.Place) -> Iterator[None]:
 @contextmanager
 def _stopped_by_signals() -> Iterator[None]:
     """Signals that end a process raise Stopped, so that what is being done is cleaned up; the second one is ignored."""
-    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    numbers = [
+        number
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+        if number == signal.SIGTERM or signal.getsignal(number) != signal.SIG_IGN  # nohup asks to ignore one
+    ]
 
     def stop(number: int, frame: FrameType | None) -> NoReturn:
         for each in numbers:
