@@ -14,7 +14,7 @@ setup(
     maintainer_email="maintainers@users.noreply.github.com",
     license="Apache-2.0",
     python_requires=">=3.11",
-    packages=["ctr_pvs", "ctr_pvs_ros"],
+    packages=["ctr_pvs", "ctr_pvs.kernel", "ctr_pvs.kernel.compiler", "ctr_pvs_ros"],
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (f"share/{PACKAGE}", ["package.xml"]),
@@ -22,7 +22,8 @@ setup(
         (f"share/{PACKAGE}/config", sorted(glob("config/*.yaml"))),
         (f"share/{PACKAGE}/data", ["test/data/reference_values.json"]),
     ],
-    install_requires=["numpy>=1.26", "scipy>=1.11", "pyyaml>=6"],
+    # Numba is not in package.xml: some releases of Ubuntu have no package of it, and the solver runs without, slower.
+    install_requires=["numpy>=1.26", "scipy>=1.11", "pyyaml>=6", "numba>=0.59"],
     extras_require={"test": ["pytest"], "demo": ["matplotlib"]},
     zip_safe=True,
     entry_points={
