@@ -3,9 +3,10 @@
 ``entries`` holds the few functions that the rest of the package calls, always as ``entries.name(...)``, so that each
 call meets what is in use at that moment.  Everything else in this room is called from there.  Rules of the room:
 
-- Arguments and results are contiguous float64 or int64 arrays and scalars: no classes of ours, no Python objects.
+- Arguments of entry points are contiguous arrays and scalars, their results scalars: no classes of ours, no Python
+  objects.  Callers see to the scalars: Numba takes 2.7 for an int64 and makes 2 of it.
 - Loops are written out.  No ``@``, ``dot`` or linalg (they warn, and bring threads), no ``parallel``.
-- Nothing is allocated inside a loop: workspaces come in from outside.
+- Nothing is allocated: no ``np.empty``, no ``x[:] = y``.  Workspaces come in from outside; views of them are free.
 - Nothing is divided by what can be 0: interpreted that would raise or warn, compiled it gives inf.
 - Every function carries ``@compiled``, an entry ``@entry_point("its Numba signature")``.  Other functions of the room
   are imported by name: Numba does not find them through their module.

@@ -278,7 +278,16 @@ def test_what_cannot_be_compiled_is_named_and_leaves_nothing(tmp_path):
 def test_a_performance_warning_of_numba_is_an_error(tmp_path):
     text = '\n@entry_point("float64(float64[:], float64[:])")\ndef dot(x, y):\n    return np.dot(x, y)\n'
     toy = Toy(tmp_path, "import numpy as np\n" + ENTRIES + text)
+    (toy.code / "scipy.py").unlink()
     assert "NumbaPerformanceWarning" in toy.compile(code=1)
+
+
+@needs_numba
+def test_a_kernel_that_allocates_is_an_error(tmp_path):
+    """Numba would make a copy of x here, for the case that both are parts of one array."""
+    text = '\n@entry_point("int64(float64[::1], float64[::1])")\ndef make(x, y):\n    y[:] = x\n    return len(y)\n'
+    toy = Toy(tmp_path, ENTRIES + text)
+    assert toy.compile(code=1).startswith("kernels could not be compiled: make: ")
 
 
 @needs_numba

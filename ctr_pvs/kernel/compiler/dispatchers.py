@@ -19,8 +19,10 @@ from ctr_pvs.kernel.compiler.registry import functions
 
 #: A Numba dispatcher; Numba has no types to name it by.
 Dispatcher = Any
-#: All threads may run kernels at once; 0/0 gives nan instead of raising, as in numpy.
-OPTIONS = {"nogil": True, "error_model": "numpy"}
+#: All threads may run kernels at once; 0/0 gives nan instead of raising, as in numpy; nothing calls kernels through C.
+#: And no counting of references to arrays: with it, a tuple of thirty arrays handed to a function costs more than most
+#: functions do, and LLVM can hardly inline.  Whatever would allocate then is an error of compiling.
+OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True, "_nrt": False}
 
 
 class NotInCacheError(Exception):
@@ -37,7 +39,11 @@ def make(folder: Path) -> dict[FunctionType, Dispatcher]:
     try:
         # Read when a dispatcher with a cache is made, and only then; other users of Numba keep their own folder.
         numba.config.CACHE_DIR = str(folder)
-        made = {f: numba.njit(cache=f in signed, **OPTIONS)(copy) for f, copy in copies.items()}
+        # Python calls entry points only; what takes arguments from it is half of the compiling.
+        made = {
+            f: numba.njit(cache=f in signed, no_cpython_wrapper=f not in signed, **OPTIONS)(copy)
+            for f, copy in copies.items()
+        }
     finally:
         numba.config.CACHE_DIR = kept
     for namespace in {id(copy.__globals__): copy.__globals__ for copy in copies.values()}.values():
