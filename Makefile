@@ -8,7 +8,7 @@ IN_ENV := scripts/in_env.sh
 help: ## show this list
 	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 15
 
-setup: ## ROS 2 (sourced, or a venv) and the built workspace
+setup: ## ROS 2 (sourced, or a venv), the built workspace and the compiled kernels
 	@scripts/setup.sh
 
 demo: setup ## stream the two sweeps of Fig. 4 through the node, check every tip, draw demo/fig4.png
@@ -36,6 +36,8 @@ bench: setup ## speed against accuracy, measured here and charted: docs/speed_ac
 	@$(IN_ENV) python3 bench/effectivity.py
 	@$(IN_ENV) python3 bench/node_latency.py
 
-clean: ## remove everything that make has made
+clean: ## remove everything that make has made, compiled kernels in the user's cache among it
+	@.venv/bin/python3 -m ctr_pvs.kernel --remove 2>/dev/null | sed 's/^/rm -rf /' || true
 	rm -rf .venv .ws demo .mypy_cache .pytest_cache .ruff_cache
 	find ctr_pvs ctr_pvs_ros test -name __pycache__ -prune -exec rm -rf {} +
+	@echo "the next make sets up anew and compiles the kernels again, which takes some minutes"

@@ -23,7 +23,8 @@ setup(
         (f"share/{PACKAGE}/config", sorted(glob("config/*.yaml"))),
         (f"share/{PACKAGE}/data", ["test/data/reference_values.json"]),
     ],
-    install_requires=["numpy>=1.26", "scipy>=1.11", "pyyaml>=6"],
+    # Numba is not in package.xml: some releases of Ubuntu have no package of it, and the solver runs without, slower.
+    install_requires=["numpy>=1.26", "scipy>=1.11", "pyyaml>=6", "numba>=0.59"],
     extras_require={"test": ["pytest"], "demo": ["matplotlib"]},
     zip_safe=True,
     entry_points={

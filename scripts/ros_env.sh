@@ -1,6 +1,6 @@
 # Shell functions shared by setup.sh and in_env.sh: which ROS 2 is used, and how to enter it. Meant to be sourced.
 
-ROOT=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+ROOT=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd -P) # links followed: compiled kernels are found by this path
 VENV=$ROOT/.venv
 WORKSPACE=$ROOT/.ws
 
@@ -19,6 +19,9 @@ enter_venv() {
   if [ "$1" = wheels ]; then
     unset PYTHONPATH AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
     export AMENT_PREFIX_PATH=$VENV CMAKE_PREFIX_PATH=$VENV
+  else
+    # The node's script names the system's Python, which does not look into .venv by itself; Numba lies there.
+    export PYTHONPATH=${PYTHONPATH:+$PYTHONPATH:}$(echo "$VENV"/lib/python3*/site-packages)
   fi
   export VIRTUAL_ENV=$VENV PATH=$VENV/bin:$PATH
 }

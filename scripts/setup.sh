@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Make this folder ready to run: system packages, a venv, and the colcon workspace in .ws. Safe to call again: each
-# step is skipped while what it was made from (see the two keys below) has not changed.
+# Make this folder ready to run: system packages, a venv, the colcon workspace in .ws, and the compiled kernels. Safe to
+# call again: each step is skipped while what it was made from (see the keys below) has not changed.
 set -euo pipefail
 # shellcheck source=scripts/ros_env.sh
 source "$(dirname "${BASH_SOURCE[0]}")/ros_env.sh"
@@ -55,6 +55,8 @@ install_packages() {
   DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" >/dev/null
 }
 
+install_wheels() { "$VENV/bin/python3" -m pip install --quiet --no-input --disable-pip-version-check "$@"; }
+
 make_venv() {
   local ros=$1 python options=() lists=(-r scripts/requirements.txt)
   rm -rf "$VENV" "$WORKSPACE"
@@ -66,10 +68,16 @@ make_venv() {
   else
     python=/usr/bin/python3
     options=(--system-site-packages)
-    say "using the sourced ROS 2 Jazzy; .venv holds only the checkers"
+    say "using the sourced ROS 2 Jazzy; .venv holds only the checkers and Numba"
   fi
   "$python" -m venv "${options[@]}" "$VENV"
-  "$VENV/bin/python3" -m pip install --quiet --no-input --disable-pip-version-check "${lists[@]}"
+  # All at once, so that Numba gets a numpy that it knows.
+  if ! install_wheels "${lists[@]}" -r scripts/requirements-compiler.txt; then
+    say "trying without Numba"
+    install_wheels "${lists[@]}"
+    say "Numba could not be installed, so kernels run interpreted, slower, with the same numbers. To try again:
+    $VENV/bin/python3 -m pip install -r scripts/requirements-compiler.txt"
+  fi
   [ "$ros" != wheels ] || "$VENV/bin/python3" scripts/fix_exported_cmake.py
 }
 
@@ -80,6 +88,18 @@ build_workspace() {
     --cmake-args -DBUILD_TESTING=OFF >"$WORKSPACE/colcon.txt" 2>&1; then
     cat "$WORKSPACE/colcon.txt" >&2
     fail "colcon build failed"
+  fi
+}
+
+# The solver also runs without: no reason to fail.
+compile_kernels() {
+  local outcome
+  say "compiling the kernels, once for these sources (a minute or so)"
+  if outcome=$(python3 -m ctr_pvs.kernel); then
+    say "$outcome"
+    { echo "$1"; python3 -m ctr_pvs.kernel --where; } >"$WORKSPACE/kernels_made_from"
+  else
+    say "${outcome:-the kernels could not be compiled}: they run interpreted, slower, with the same numbers"
   fi
 }
 
@@ -100,4 +120,11 @@ if [ "$(cat "$WORKSPACE/made_from" 2>/dev/null)" != "$workspace_key" ]; then
   enter_venv "$ROS"
   build_workspace
   echo "$workspace_key" >"$WORKSPACE/made_from"
+fi
+
+# Compiled kernels lie in the user's cache, which may have been emptied since: the second line names the folder.
+kernels_key=$(find ctr_pvs/kernel -name '*.py' -print0 | sort -z | xargs -0 sha256sum | cat - "$VENV/made_from" | sha256sum)
+mapfile -t kernels < <(cat "$WORKSPACE/kernels_made_from" 2>/dev/null)
+if [ "${kernels[0]:-}" != "$kernels_key" ] || [ ! -e "${kernels[1]:-}/COMPLETE" ]; then
+  (enter_venv "$ROS" && compile_kernels "$kernels_key")
 fi

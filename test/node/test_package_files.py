@@ -103,3 +103,22 @@ def test_package_xml_names_every_ros_package_that_is_imported():
     }
     assert "rclpy" in ros
     assert ros <= named
+
+
+def test_every_folder_of_python_modules_is_installed():
+    packages = set(ast.literal_eval(setup_arguments()["packages"]))
+    folders = (path.parent for top in ("ctr_pvs", "ctr_pvs_ros") for path in (ROOT / top).rglob("__init__.py"))
+    assert packages == {".".join(folder.relative_to(ROOT).parts) for folder in folders}
+
+
+def test_numba_comes_with_pip_from_one_version_on_and_rosdep_does_not_ask_for_it():
+    tree = ast.parse((ROOT / "ctr_pvs" / "kernel" / "compiler" / "switch.py").read_text(encoding="utf-8"))
+    (minimum,) = (
+        ast.literal_eval(node.value)
+        for node in tree.body
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "MINIMUM"
+    )
+    required = f"numba>={minimum[0]}.{minimum[1]}"
+    assert required in ast.literal_eval(setup_arguments()["install_requires"])
+    assert required in (ROOT / "scripts" / "requirements-compiler.txt").read_text(encoding="utf-8").splitlines()
+    assert "numba" not in (ROOT / "package.xml").read_text(encoding="utf-8")
