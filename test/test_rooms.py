@@ -42,6 +42,7 @@ NOT_YET_MOVED = {
     "equilibria",
     "equilibrium",
     "fidelity",
+    "full_solution",
     "jacobian",
     "lazy",
     "materials",
