@@ -56,7 +56,7 @@ def one_sided(robot, alpha, D, tube, side):
     return difference(robot, alpha, D, len(alpha) + tube, side * 1e-4, (0, 1, 2, 3), factors)
 
 
-@pytest.mark.parametrize("tubes", [2, 3])
+@pytest.mark.parametrize("tubes", [2, 3, 4])
 @pytest.mark.parametrize("seed", range(2))
 def test_loads_are_energy_derivatives(tubes, seed):
     rng = np.random.default_rng([seed, tubes, 31])
