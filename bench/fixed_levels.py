@@ -16,6 +16,7 @@ from ctr_pvs import EquilibriumSolver
 from ctr_pvs import Robot
 from ctr_pvs.materials import Materials
 from ctr_pvs.models import Models
+from ctr_pvs.pvs import frames
 from ctr_pvs.pvs.energy import FullEnergy
 from ctr_pvs.pvs.projection import projected_residual
 from ctr_pvs.pvs.solution import FullShape
@@ -124,7 +125,7 @@ class Full(Level):
         if not found.converged:
             return None
         self.q = found.q
-        return tip_position(FullShape(energy, found.q), self.integration)
+        return frames.tip_position(FullShape(energy, found.q), self.integration)
 
     def cold(self, alpha: Array) -> Array | None:
         """As the package does it: the equilibrium of `torsion` first, then the strains nearest to it."""

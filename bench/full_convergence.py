@@ -16,10 +16,10 @@ from ctr_pvs import Tube
 from ctr_pvs import load_robot
 from ctr_pvs.oracles.standard_model import solve_standard_bvp
 from ctr_pvs.pvs.energy import FullEnergy
+from ctr_pvs.pvs.frames import tip_position
 from ctr_pvs.pvs.solution import FullSolution
 from ctr_pvs.pvs.solution import solve_full
 from ctr_pvs.pvs.strain_basis import PolynomialBasis
-from ctr_pvs.refine import tip_position
 
 ROOT = Path(__file__).resolve().parents[1]
 DEGREES = (1, 2, 3, 4, 5, 6, 8, 10, 12)

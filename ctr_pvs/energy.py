@@ -13,7 +13,6 @@ derivative of this one scalar.  Only coupled sections depend on psi; in all othe
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +21,9 @@ from ctr_pvs.basis import GaussRule
 from ctr_pvs.basis import gauss_legendre
 from ctr_pvs.lazy import lazy
 from ctr_pvs.materials import Materials
+from ctr_pvs.model.materials import SectionNodes
+from ctr_pvs.model.materials import bending_density
+from ctr_pvs.model.materials import shared_curvature
 from ctr_pvs.twist import Degrees
 from ctr_pvs.twist import TwistSpace
 
@@ -30,34 +32,6 @@ ComplexArray = NDArray[np.complex128]
 
 #: Gauss points in a section where psi is not needed: exact for pre-curvatures up to degree 7, near exact for helices.
 PLAIN_NODES = 8
-
-
-def shared_curvature(bending: Array, moment: ComplexArray) -> ComplexArray:
-    """Curvature k [1/m] of the backbone where tubes with stiffnesses ``bending`` (..., N) [N m^2] share the bending
-    ``moment`` (..., N), K_j exp(i psi_j) kappa*_j: the balance of eq. (26), point by point."""
-    return moment.sum(axis=-1) / bending.sum(axis=-1)
-
-
-def bending_density(bending: Array, pre_curvature: ComplexArray, psi: Array, k: ComplexArray) -> Array:
-    """Energy density w [J/m] (...) of tubes (..., N) bent to the curvature ``k`` (...) [1/m]; a sum of squares, so
-    nothing cancels."""
-    strain = pre_curvature - np.asarray(k)[..., None] * np.exp(-1j * psi)
-    return 0.5 * np.sum(bending * np.abs(strain) ** 2, axis=-1)
-
-
-@dataclass(frozen=True, eq=False)
-class SectionNodes:
-    """Gauss points of one section: where the energy density is sampled.
-
-    s, weight : (g,) arc lengths [m] and quadrature weights [m]; bending (N,) K; kappa (g, N) pre-curvatures [1/m].
-    """
-
-    section: int
-    rule: GaussRule
-    s: Array
-    weight: Array
-    bending: Array
-    kappa: ComplexArray
 
 
 class TorsionEnergy:

@@ -36,6 +36,8 @@ from ctr_pvs.solve import residual_limit
 from ctr_pvs.solve import twist_size
 from ctr_pvs.status import Status
 from ctr_pvs.twist import TorqueField
+from ctr_pvs.twist import TwistSpace
+from ctr_pvs.unknowns import CONSTANT
 
 Array = NDArray[np.float64]
 
@@ -114,7 +116,7 @@ def _of_pair(polish: _Polish, pair: TubePair) -> Equilibria:
     tips = curve.tips_at(float(polish.alpha[pair.b] - polish.alpha[pair.a]))
     gaps = np.diff(tips, prepend=-np.inf, append=np.inf)
     room = np.minimum(ROOM, SHARE_OF_GAP * np.minimum(gaps[:-1], gaps[1:]))
-    found = polish.exact(curve.integral.fields(tips, polish.energy(DEGREES[-1]).space), room)
+    found = polish.exact(_fields(curve, tips, polish.energy(DEGREES[-1]).space), room)
     method = (
         "integration from the tip: all equilibria lie on one curve, and every crossing with the command was taken; "
         f"folds between which the curve goes back by less than {DEPTH:g} rad could be missed"
@@ -122,6 +124,26 @@ def _of_pair(polish: _Polish, pair: TubePair) -> Equilibria:
     if not curve.resolved:
         method += "; not complete: the pair is so strong that its curve could not be resolved everywhere"
     return _sorted(found, len(tips), curve.resolved, method)
+
+
+def _fields(curve: TipCurve, tips: Array, space: TwistSpace) -> list[TorqueField]:
+    """The torques along the robot for each tip angle (m,), in the functions of ``space``."""
+    domain, sections = space.materials.domain, range(space.materials.domain.n_sections)
+    bases = tuple(space.basis(m) if space.materials.coupled[m] else CONSTANT for m in sections)
+    places = [domain.boundaries[m] + domain.lengths[m] * bases[m].rule.x for m in sections]
+    torques = curve.integral.torques(tips, np.concatenate([np.zeros(1), *places]))
+    guide, parts = torques[:, 0], np.split(torques[:, 1:], np.cumsum([len(s) for s in places])[:-1], axis=1)
+    tables = [basis.tabulate(basis.rule.x)[0] * basis.rule.weights[:, None] for basis in bases]
+    return [
+        TorqueField(
+            guide[i],
+            domain.boundaries,
+            bases,
+            tuple(part[i].T @ table for part, table in zip(parts, tables, strict=True)),
+            domain.topology,
+        )
+        for i in range(len(tips))
+    ]
 
 
 def _of_many(polish: _Polish) -> Equilibria:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ctr_pvs.composition import composition
 from ctr_pvs.lazy import lazy
+from ctr_pvs.model import materials
 from ctr_pvs.robot.robot import Robot
 from ctr_pvs.robot.robot import Segment
 from ctr_pvs.sections import Domain
@@ -21,12 +22,14 @@ Array = NDArray[np.float64]
 FIVE_PLACES = np.linspace(0.0, 1.0, 5)
 
 
-class Materials:
+class Materials(materials.Materials):
     """Stiffnesses and pre-curvatures of ``robot`` laid over ``domain``: N tubes, M sections.
 
     composition : what the sections hold.  Of its tables, bending, torsional (M, N), curved (M, N), coupled (M,) and
     curved_tubes are at hand here as well.
     """
+
+    domain: Domain
 
     def __init__(self, robot: Robot, domain: Domain) -> None:
         self.robot, self.domain = robot, domain

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from ctr_pvs.backbone import chain
 from ctr_pvs.backbone import position_of
+from ctr_pvs.full_solution import FullSolution
 from ctr_pvs.pvs.energy import FullEnergy
-from ctr_pvs.pvs.solution import FullSolution
 from ctr_pvs.pvs.solution import solve_full
 from ctr_pvs.pvs.strain_basis import PolynomialBasis
 from ctr_pvs.shape import Shape

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from abc import ABC
-from abc import abstractmethod
 from functools import cached_property
 
 import numpy as np
@@ -13,6 +11,7 @@ from ctr_pvs.basis import gauss_legendre
 from ctr_pvs.collocation import nodes_needed
 from ctr_pvs.energy import shared_curvature
 from ctr_pvs.materials import Materials
+from ctr_pvs.model import shape
 from ctr_pvs.pieces import Arc
 from ctr_pvs.pieces import Bend
 from ctr_pvs.pieces import Piece
@@ -30,42 +29,14 @@ SAMPLES = 5
 STRAIGHT = 1e-9
 
 
-class Shape(ABC):
-    """Fields of N tubes over the M sections of a domain, under base angles ``alpha`` (N,) [rad].
+class Shape(shape.Shape):
+    """A shape that knows its backbone."""
 
-    twists : false if tubes are taken for rigid in torsion, so that their torques do no work.
-    """
-
-    twists = True
-
-    def __init__(self, materials: Materials, alpha: Array) -> None:
-        self.materials = materials
-        self.alpha = alpha
+    materials: Materials
 
     @property
     def domain(self) -> Domain:
         return self.materials.domain
-
-    @abstractmethod
-    def angle(self, m: int, x: Array) -> Array:
-        """psi (g, N) [rad] at the places ``x`` (g,) in [0, 1] of section m."""
-
-    @abstractmethod
-    def twist_rate(self, m: int, x: Array) -> Array:
-        """psi' (g, N) [rad/m] at the places ``x`` of section m, 0 for absent tubes."""
-
-    @abstractmethod
-    def curvature(self, m: int, x: Array) -> ComplexArray:
-        """k (g,) [1/m] of the backbone, k_y + i k_z in the Bishop frame, at the places ``x`` of section m."""
-
-    @property
-    @abstractmethod
-    def angle_at_boundaries(self) -> Array:
-        """psi (M + 1, N) [rad] at the section boundaries; past its tip a tube keeps its last angle."""
-
-    def panels(self, m: int) -> int:
-        """Number of equal panels of section m on which the fields are smooth: quadrature must not cross their seams."""
-        return 1
 
     def pieces(self, tolerance: float, tube: int | None = None) -> list[Piece]:
         """The backbone from the orifice to the tip, for an error of about ``tolerance`` [m] anywhere on it.
@@ -109,31 +80,6 @@ class Shape(ABC):
         """The fastest turn [rad/m] of a pre-curvature in section m."""
         present = enumerate(self.domain.segment[m])
         return max(abs(self.materials.segment(j, int(index)).turn) for j, index in present if index != ABSENT)
-
-    @property
-    def leader(self) -> int:
-        """See ``Domain.leader``."""
-        return self.domain.leader
-
-    def angles_at(self, s: Array) -> Array:
-        """psi (g, N) [rad] at arc lengths ``s`` (g,) [m], NaN where a tube has ended (its tip still counts)."""
-        if not self.domain.n_sections:
-            return np.repeat(self.angle_at_boundaries, len(s), axis=0)
-        psi = self.angles_held(s)
-        psi[self.domain.segment[self.domain.locate(s)] == ABSENT] = np.nan
-        at_orifice = s <= self.domain.boundaries[0]
-        psi[at_orifice] = self.angle_at_boundaries[0]  # a tube that ends on the orifice has an angle there
-        return psi
-
-    def angles_held(self, s: Array) -> Array:
-        """psi (g, N) [rad] at arc lengths ``s`` (g,) [m], where past its tip a tube keeps its last angle."""
-        psi = np.empty((len(s), len(self.alpha)))
-        section = self.domain.locate(s)
-        for m in np.unique(section):
-            here = section == m
-            x = (s[here] - self.domain.boundaries[m]) / self.domain.lengths[m]
-            psi[here] = self.angle(int(m), x)
-        return psi
 
 
 class TorsionShape(Shape):

@@ -15,7 +15,10 @@ ROOMS = ("errors", "robot", "model", "kernel", "pvs", "answer", "oracles", "solv
 PLAIN = ("robot", "model", "kernel")
 #: Modules outside the rooms that stay there.
 FRONT = {"__init__", "__main__", "errors"}
-#: Modules that have no room yet: they may use every room, and every room may use them. One that moves leaves this list.
+#: Rooms that use nothing of what has no room yet.
+SETTLED = ("errors", "robot", "model", "kernel", "pvs", "oracles")
+#: Modules that have no room yet: they may use every room, and rooms that are not settled may use them. One that moves
+#: leaves this list.
 NOT_YET_MOVED = {
     "actuation",
     "backbone",
@@ -42,6 +45,7 @@ NOT_YET_MOVED = {
     "equilibria",
     "equilibrium",
     "fidelity",
+    "full_solution",
     "jacobian",
     "lazy",
     "materials",
@@ -96,7 +100,7 @@ def imports(source: str) -> Iterator[str]:
 
 def forbidden(room: str, source: str) -> list[str]:
     """What a module in ``room`` imports from the package although it may not."""
-    allowed = {*ROOMS[: ROOMS.index(room) + 1], *NOT_YET_MOVED}
+    allowed = {*ROOMS[: ROOMS.index(room) + 1], *(() if room in SETTLED else NOT_YET_MOVED)}
     wrong = []
     for name in imports(source):
         top, _, rest = name.partition(".")
@@ -126,6 +130,8 @@ def test_errors_stand_on_nothing():
         ("from ctr_pvs.errors import RobotError", False),
         ("from ctr_pvs.pvs.energy import FullEnergy", False),
         ("from ctr_pvs.robot import file", False),
+        ("from ctr_pvs.model.shape import Shape", False),
+        ("from ctr_pvs.shape import Shape", True),
         ("import numpy", False),
         ("from ctr_pvs.cli.main import main", True),
         ("from ctr_pvs import cli", True),

@@ -27,10 +27,10 @@ from scipy.integrate import solve_bvp
 from scipy.integrate import solve_ivp
 from scipy.optimize import root
 
+from ctr_pvs.model.sections import SAME_PLACE
 from ctr_pvs.oracles.standard_equations import Problem
 from ctr_pvs.oracles.standard_equations import Section
 from ctr_pvs.robot.robot import Robot
-from ctr_pvs.sections import SAME_PLACE
 
 Array = NDArray[np.float64]
 #: Of one section: psi (p, ...) [rad] at arc lengths s (...) [m].

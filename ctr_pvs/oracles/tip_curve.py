@@ -22,9 +22,6 @@ from scipy.integrate import solve_ivp
 
 from ctr_pvs.oracles.tube_pair import PairSection
 from ctr_pvs.oracles.tube_pair import TubePair
-from ctr_pvs.twist import TorqueField
-from ctr_pvs.twist import TwistSpace
-from ctr_pvs.unknowns import CONSTANT
 
 Array = NDArray[np.float64]
 
@@ -72,37 +69,29 @@ class TipIntegral:
             at_base = states[2, 0] - self.pair.lead * self.unit * states[3, 0]
         return np.asarray(count + (positive != (at_base > 0.0)))
 
-    def fields(self, tips: Array, space: TwistSpace) -> list[TorqueField]:
-        """The torques along the robot for each tip angle (m,), in the functions of ``space``."""
-        domain, tubes = space.materials.domain, space.materials.robot.n_tubes
-        sections = [np.zeros((len(tips), tubes, 1)) for _ in range(domain.n_sections)]
-        bases = [CONSTANT] * domain.n_sections
-        lead = np.zeros((len(tips), tubes, 1))
+    def torques(self, tips: Array, s: Array) -> Array:
+        """(m, g, N) torque [N m] of every tube at arc lengths ``s`` (g,) [m], for tip angles (m,).
+
+        It is constant from the guide to the first coupled section, and 0 past the last one.
+        """
+        s, section_of = np.asarray(s, dtype=np.float64), self.pair.materials.domain.locate(s)
+        carried, torque = np.zeros((len(tips), len(s))), np.zeros(len(tips))
 
         def places(section: PairSection) -> Array:
-            return np.concatenate([[0.0], space.basis(section.index).rule.x])
+            x = (s[section_of == section.index] - section.start) / section.length
+            return np.unique(np.append(0.0, np.clip(x, 0.0, 1.0)))
 
         for section, states in self._states(tips, places):
-            torque = states[1, :1].T
-            lead = self._shared(torque)
+            here, torque = section_of == section.index, states[1, 0]
             if section.coupled:
-                basis = space.basis(section.index)
-                torque = (states[1, 1:].T * basis.rule.weights) @ basis.tabulate(basis.rule.x)[0]
-                bases[section.index] = basis
-            sections[section.index] = self._shared(torque)
-        sections[: self.pair.sections[0].index] = [lead] * self.pair.sections[0].index
-        return [
-            TorqueField(
-                lead[i, :, 0], domain.boundaries, tuple(bases), tuple(part[i] for part in sections), domain.topology
-            )
-            for i in range(len(tips))
-        ]
-
-    def _shared(self, torque: Array) -> Array:
-        """(m, N, n) torques [N m] of all tubes from those of tube b (m, n) in this class's unit."""
-        shared = np.zeros((len(torque), self.pair.materials.robot.n_tubes, torque.shape[1]))
-        shared[:, self.pair.a], shared[:, self.pair.b] = -self.unit * torque, self.unit * torque
-        return shared
+                x = np.clip((s[here] - section.start) / section.length, 0.0, 1.0)
+                carried[:, here] = states[1, np.searchsorted(places(section), x)].T
+            else:
+                carried[:, here] = torque[:, None]
+        carried[:, s <= self.pair.sections[0].start] = torque[:, None]
+        out = np.zeros((*carried.shape, self.pair.materials.robot.n_tubes))
+        out[..., self.pair.a], out[..., self.pair.b] = -self.unit * carried, self.unit * carried
+        return out
 
     def _fine(self, section: PairSection) -> Array:
         """Places in [0, 1] so close that no two zeros of a perturbation lie between neighbours."""

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from numpy.typing import NDArray
 
-from ctr_pvs.materials import Materials
+from ctr_pvs.model.materials import Materials
+from ctr_pvs.model.sections import piecewise_domain
 from ctr_pvs.robot.robot import Robot
-from ctr_pvs.sections import piecewise_domain
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]

@@ -16,12 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-from ctr_pvs.basis import gauss_legendre
-from ctr_pvs.energy import SectionNodes
-from ctr_pvs.materials import Materials
+from ctr_pvs.model.basis import gauss_legendre
+from ctr_pvs.model.materials import Materials
+from ctr_pvs.model.materials import SectionNodes
+from ctr_pvs.model.materials import section_nodes
+from ctr_pvs.model.shape import Shape
 from ctr_pvs.pvs.space import FullSpace
 from ctr_pvs.pvs.strain_basis import StrainBasis
-from ctr_pvs.shape import Shape
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -181,15 +182,5 @@ class FullEnergy:
 
     def section_nodes(self) -> list[SectionNodes]:
         """The Gauss points beyond the orifice, as loads read them."""
-        return [
-            SectionNodes(
-                section.index,
-                self.rule,
-                section.start + section.length * self.rule.x,
-                section.length * self.rule.weights,
-                self.materials.bending[section.index],
-                self.materials.pre_curvature(section.index, section.start + section.length * self.rule.x),
-            )
-            for section in self.space.sections
-            if section.bends
-        ]
+        bent = [section.index for section in self.space.sections if section.bends]
+        return [section_nodes(self.materials, m, self.rule) for m in bent]

@@ -15,15 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from ctr_pvs.backbone import bishop_frames
+from ctr_pvs.model.sections import SAME_PLACE
 from ctr_pvs.pvs.energy import FullEnergy
+from ctr_pvs.pvs.frames import bishop_frames
 from ctr_pvs.pvs.se3 import adjoint
 from ctr_pvs.pvs.se3 import hat
 from ctr_pvs.pvs.se3 import homogeneous
 from ctr_pvs.pvs.se3 import inverse
 from ctr_pvs.pvs.se3 import roll
 from ctr_pvs.pvs.solution import FullShape
-from ctr_pvs.sections import SAME_PLACE
 
 Array = NDArray[np.float64]
 
@@ -133,7 +133,7 @@ class Motion:
         places = [self.sections[m].start + self.sections[m].length * part * rule.x for m, part in pieces]
         section = self.sections[number]
         stops = np.concatenate([np.zeros(1), *places, [section.start + x * section.length]])
-        frames = homogeneous(*bishop_frames(self.shape.pieces(INTEGRATION), stops))
+        frames = homogeneous(*bishop_frames(self.shape, stops, INTEGRATION))
         spatial = np.zeros((6, self.alpha_rate.shape[1]))
         start = 1
         for m, part in pieces:

@@ -15,11 +15,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ctr_pvs.basis import gauss_legendre
 from ctr_pvs.errors import FieldError
+from ctr_pvs.model.basis import gauss_legendre
+from ctr_pvs.model.sections import ABSENT
+from ctr_pvs.model.shape import Shape
 from ctr_pvs.robot.robot import Robot
-from ctr_pvs.sections import ABSENT
-from ctr_pvs.shape import Shape
 
 Array = NDArray[np.float64]
 

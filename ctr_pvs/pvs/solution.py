@@ -1,4 +1,7 @@
-"""Equilibria of the `full` level: Newton, the shape, and the stability margin after bending is eliminated."""
+"""Equilibria of the `full` level: Newton, the shape, and the stability margin after bending is eliminated.
+
+The backbone of a shape is integrated by ``frames``, its loads are derivatives of its energy (``virtual_work``).
+"""
 
 from __future__ import annotations
 
@@ -10,14 +13,11 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.linalg import eigvalsh
 
-from ctr_pvs.actuation import Loads
-from ctr_pvs.actuation import virtual_work_loads
 from ctr_pvs.errors import FieldError
+from ctr_pvs.model.shape import Shape
 from ctr_pvs.pvs.energy import FullEnergy
-from ctr_pvs.shape import Shape
-from ctr_pvs.solution import Solution
-from ctr_pvs.solution import TorsionSolution
-from ctr_pvs.status import NoEquilibriumError
+from ctr_pvs.pvs.virtual_work import Loads
+from ctr_pvs.pvs.virtual_work import virtual_work_loads
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -87,30 +87,34 @@ class FullShape(Shape):
         return np.array([start, *ends])
 
 
-class FullSolution(Solution):
-    """A stationary point ``q`` (n,) of ``energy``; ``limit`` is the `torsion` solution it converges to, if known."""
+class FullSolution:
+    """A stationary point ``q`` (n,) of ``energy``.
 
-    def __init__(self, energy: FullEnergy, q: Array, limit: TorsionSolution | None = None) -> None:
-        self.energy, self.q, self.limit = energy, q, limit
-        self.shape: FullShape = FullShape(energy, q)
+    shape : its fields along the robot; degrees_of_freedom : number of unknowns solved for.
+    """
+
+    def __init__(self, energy: FullEnergy, q: Array) -> None:
+        self.energy, self.q = energy, q
+        self.shape = FullShape(energy, q)
 
     @property
     def degrees_of_freedom(self) -> int:
         return self.energy.n
 
     def loads(self) -> Loads:
+        """Actuation loads by virtual work."""
         return virtual_work_loads(self.shape, self.energy.section_nodes())
 
     def elastic_energy(self) -> float:
+        """Energy [J], straightening in the guide counted."""
         return self.energy.value(self.q) + float(self.energy.materials.straightening_energy.sum())
 
     def stability_margin(self) -> float:
-        """At this basis, and below 1 no more than that of the `torsion` limit: a basis is optimistic."""
-        own = self._margin_here()
-        return own if own == 1.0 or self.limit is None else min(own, self.limit.stability_margin())
+        """Smallest eigenvalue of the energy Hessian relative to torsional stiffness, clipped at 1.
 
-    def _margin_here(self) -> float:
-        """The margin of the twist after bending, always stiff, has taken its own minimum (Schur complement)."""
+        It is that of the twist after bending, always stiff, has taken its own minimum (Schur complement).  A basis is
+        optimistic: below 1 the limit of all bases has no more than this.
+        """
         hessian = self.energy.hessian(self.q)
         values, vectors = eigh(self.energy.torsion_metric)
         twists = values > 1e-12 * max(float(values.max(initial=0.0)), 1e-300)
@@ -122,17 +126,3 @@ class FullSolution(Solution):
         stiff = bends.T @ hessian @ bends
         schur = basis.T @ hessian @ basis - mixed @ np.linalg.lstsq(stiff, mixed.T, rcond=1e-13)[0]
         return min(1.0, float(eigvalsh(0.5 * (schur + schur.T))[0]))
-
-    def snap_reserve(self) -> float:
-        """That of the `torsion` solution, which this one converges to as its basis grows."""
-        return self._limit.snap_reserve()
-
-    def tip_jacobian(self, tolerance: float) -> Array:
-        """Rates of the `torsion` solution, which this one converges to as its basis grows."""
-        return self._limit.tip_jacobian(tolerance)
-
-    @property
-    def _limit(self) -> TorsionSolution:
-        if self.limit is None:
-            raise NoEquilibriumError("rates need the torsion solution that this full one came from")
-        return self.limit

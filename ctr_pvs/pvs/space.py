@@ -13,13 +13,13 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ctr_pvs.basis import gauss_legendre
-from ctr_pvs.materials import Materials
+from ctr_pvs.model.basis import gauss_legendre
+from ctr_pvs.model.materials import Materials
+from ctr_pvs.model.sections import ABSENT
+from ctr_pvs.model.sections import SAME_PLACE
 from ctr_pvs.pvs.strain_basis import SectionBasis
 from ctr_pvs.pvs.strain_basis import SectionView
 from ctr_pvs.pvs.strain_basis import StrainBasis
-from ctr_pvs.sections import ABSENT
-from ctr_pvs.sections import SAME_PLACE
 
 Array = NDArray[np.float64]
 

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from numpy.typing import NDArray
 
-from ctr_pvs.basis import legendre
 from ctr_pvs.errors import FieldError
+from ctr_pvs.model.basis import legendre
 
 Array = NDArray[np.float64]
 

@@ -8,10 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ctr_pvs.backbone import poses
 from ctr_pvs.equilibrium import Equilibrium
-from ctr_pvs.materials import Materials
+from ctr_pvs.model.materials import Materials
+from ctr_pvs.model.sections import piecewise_domain
+from ctr_pvs.model.shape import Shape
 from ctr_pvs.pvs.energy import FullEnergy
+from ctr_pvs.pvs.frames import bishop_frames
 from ctr_pvs.pvs.solution import FullSolution
 from ctr_pvs.pvs.solution import solve_full
 from ctr_pvs.pvs.strain_basis import PolynomialBasis
@@ -26,8 +28,6 @@ from ctr_pvs.renda2021.robots import curved_robot
 from ctr_pvs.renda2021.robots import fig2_robot
 from ctr_pvs.renda2021.robots import fig4_robot
 from ctr_pvs.robot.robot import Robot
-from ctr_pvs.sections import piecewise_domain
-from ctr_pvs.shape import Shape
 from ctr_pvs.solver import EquilibriumSolver
 from ctr_pvs.status import NoEquilibriumError
 
@@ -240,4 +240,4 @@ def _places(shape: Shape) -> Array:
 
 def _points(shape: Shape) -> Array:
     """(DRAWN, 3) positions [m] of the backbone, the tip last."""
-    return poses(shape.pieces(TOLERANCE), _places(shape)).position
+    return bishop_frames(shape, _places(shape), TOLERANCE)[1]

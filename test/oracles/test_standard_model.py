@@ -265,7 +265,7 @@ def test_it_stands_apart_from_the_solver_it_checks():
             if isinstance(node, ast.ImportFrom) and node.module.startswith("ctr_pvs"):
                 used.add(node.module)
             assert not (isinstance(node, ast.Import) and any(alias.name.startswith("ctr_pvs") for alias in node.names))
-    names = ("robot.robot", "sections", "materials", "oracles.standard_equations")
+    names = ("robot.robot", "model.sections", "model.materials", "oracles.standard_equations")
     assert used == {f"ctr_pvs.{name}" for name in names}
     code = "import sys, ctr_pvs; assert not [name for name in sys.modules if 'standard_' in name]"
     assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=False).returncode == 0

@@ -18,9 +18,11 @@ from ctr_pvs import Status
 from ctr_pvs import Tube
 from ctr_pvs import load_robot
 from ctr_pvs.errors import FieldError
-from ctr_pvs.materials import Materials
+from ctr_pvs.model.materials import Materials
+from ctr_pvs.model.sections import piecewise_domain
 from ctr_pvs.oracles.standard_model import solve_standard_bvp
 from ctr_pvs.pvs.energy import FullEnergy
+from ctr_pvs.pvs.frames import tip_position
 from ctr_pvs.pvs.projection import projected_residual
 from ctr_pvs.pvs.solution import FullSolution
 from ctr_pvs.pvs.solution import solve_full
@@ -28,8 +30,6 @@ from ctr_pvs.pvs.strain_basis import CustomBasis
 from ctr_pvs.pvs.strain_basis import PolynomialBasis
 from ctr_pvs.pvs.strain_basis import ReferenceStrainBasis
 from ctr_pvs.pvs.strain_basis import SectionBasis
-from ctr_pvs.refine import tip_position
-from ctr_pvs.sections import piecewise_domain
 
 
 @dataclass(frozen=True)

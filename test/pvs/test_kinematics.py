@@ -9,9 +9,10 @@ from random_robots import random_robot
 from scipy.integrate import solve_ivp
 from scipy.linalg import logm
 
-from ctr_pvs.backbone import bishop_frames
-from ctr_pvs.materials import Materials
+from ctr_pvs.model.materials import Materials
+from ctr_pvs.model.sections import piecewise_domain
 from ctr_pvs.pvs.energy import FullEnergy
+from ctr_pvs.pvs.frames import bishop_frames
 from ctr_pvs.pvs.kinematics import Motion
 from ctr_pvs.pvs.kinematics import growing_section_twist
 from ctr_pvs.pvs.kinematics import strain_jacobian
@@ -25,7 +26,6 @@ from ctr_pvs.pvs.se3 import small_adjoint
 from ctr_pvs.pvs.se3 import small_coadjoint
 from ctr_pvs.pvs.solution import FullShape
 from ctr_pvs.pvs.strain_basis import PolynomialBasis
-from ctr_pvs.sections import piecewise_domain
 
 BASIS = PolynomialBasis(2)
 
@@ -53,7 +53,7 @@ def material_pose(robot, alpha, D, q, tube, X):
                 psi = alpha[tube] + shape.energy.space.maps(number, np.array([x])).angle[0, tube] @ q
                 return frame @ roll(psi)
         raise AssertionError("the place is on no guided section")
-    rotations, positions = bishop_frames(shape.pieces(1e-13), np.array([0.0, s]))
+    rotations, positions = bishop_frames(shape, np.array([0.0, s]), 1e-13)
     return homogeneous(rotations[-1], positions[-1]) @ roll(shape.angles_at(np.array([s]))[0, tube])
 
 
