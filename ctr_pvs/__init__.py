@@ -4,12 +4,21 @@
 >>> solver = EquilibriumSolver(load_robot("config/renda2021.yaml"), tolerance=1e-6)
 >>> answer = solver.solve(alpha=[0.0, 1.0], D=[0.0935, 0.2085])
 >>> answer.tip.position, answer.torque, answer.stability_margin
+
+What solves is imported when it is first asked for: it brings the compiler along, and whoever only reads a robot file
+need not wait for that.
 """
 
-from ctr_pvs.backbone import Backbone
-from ctr_pvs.backbone import Pose
-from ctr_pvs.batch import Batch
-from ctr_pvs.equilibrium import Equilibrium
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+from typing import Any
+
+from ctr_pvs.answer.backbone import Backbone
+from ctr_pvs.answer.backbone import Pose
+from ctr_pvs.answer.status import NoEquilibriumError
+from ctr_pvs.answer.status import Status
 from ctr_pvs.errors import CommandError
 from ctr_pvs.errors import RobotError
 from ctr_pvs.errors import RobotFileError
@@ -18,9 +27,11 @@ from ctr_pvs.robot.robot import Limits
 from ctr_pvs.robot.robot import Robot
 from ctr_pvs.robot.robot import Segment
 from ctr_pvs.robot.robot import Tube
-from ctr_pvs.solver import EquilibriumSolver
-from ctr_pvs.status import NoEquilibriumError
-from ctr_pvs.status import Status
+
+if TYPE_CHECKING:
+    from ctr_pvs.answer.equilibrium import Equilibrium
+    from ctr_pvs.solve.batch import Batch
+    from ctr_pvs.solve.solver import EquilibriumSolver
 
 __all__ = [
     "Backbone",
@@ -39,3 +50,21 @@ __all__ = [
     "Tube",
     "load_robot",
 ]
+
+_LATER = {
+    "Batch": "ctr_pvs.solve.batch",
+    "Equilibrium": "ctr_pvs.answer.equilibrium",
+    "EquilibriumSolver": "ctr_pvs.solve.solver",
+}
+
+if not TYPE_CHECKING:  # checkers would take any name for one of ours
+
+    def __getattr__(name: str) -> Any:
+        if name not in _LATER:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        value = globals()[name] = getattr(import_module(_LATER[name]), name)
+        return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

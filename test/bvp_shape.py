@@ -9,11 +9,11 @@ from __future__ import annotations
 import numpy as np
 from scipy.integrate import solve_bvp
 
-from ctr_pvs.model.basis import gauss_legendre
 from ctr_pvs.model.materials import Materials
 from ctr_pvs.model.shape import Shape
 from ctr_pvs.oracles.standard_equations import Problem
 from ctr_pvs.oracles.standard_model import Collocation
+from ctr_pvs.pvs.virtual_work import quadrature
 
 #: Largest turn of a base in one step [rad].
 STEP = 0.35
@@ -82,14 +82,19 @@ class BvpShape(Shape):
 
 
 def elastic_energy(shape, nodes=24):
-    """E [J] of a shape: twist and bending in every section, and what lies in the guide, twisted and straightened."""
-    rule, materials = gauss_legendre(nodes), shape.materials
+    """E [J] of a shape: twist and bending in every section, and what lies in the guide, twisted and straightened.
+
+    nodes : a number of Gauss points on every panel, or the ``SectionNodes`` of every section.
+    """
+    materials = shape.materials
+    if isinstance(nodes, int):
+        nodes = quadrature(shape, nodes)
     guide = shape.angle_at_boundaries[0] - shape.alpha
     twisted = np.divide(guide**2, materials.guide_compliance, out=np.zeros_like(guide), where=guide != 0.0)
     energy = 0.5 * float(twisted.sum()) + float(materials.straightening_energy.sum())
-    for m, (start, length) in enumerate(zip(shape.domain.boundaries, shape.domain.lengths, strict=False)):
-        kappa = materials.pre_curvature(m, start + length * rule.x)
-        strain = kappa - shape.curvature(m, rule.x)[:, None] * np.exp(-1j * shape.angle(m, rule.x))
-        density = np.abs(strain) ** 2 @ materials.bending[m] + shape.twist_rate(m, rule.x) ** 2 @ materials.torsional[m]
-        energy += 0.5 * length * float(rule.weights @ density)
+    for node in nodes:
+        m, x = node.section, node.rule.x
+        strain = node.kappa - shape.curvature(m, x)[:, None] * np.exp(-1j * shape.angle(m, x))
+        density = np.abs(strain) ** 2 @ node.bending + shape.twist_rate(m, x) ** 2 @ materials.torsional[m]
+        energy += 0.5 * float(node.weight @ density)
     return energy

@@ -56,7 +56,17 @@ def imported_by(path):
 
 
 def test_the_solver_and_its_tests_import_nothing_of_ros():
-    allowed = {*sys.stdlib_module_names, "numpy", "scipy", "yaml", "matplotlib", "pytest", "numba", "llvmlite", "ctr_pvs"}
+    allowed = {
+        *sys.stdlib_module_names,
+        "numpy",
+        "scipy",
+        "yaml",
+        "matplotlib",
+        "pytest",
+        "numba",
+        "llvmlite",
+        "ctr_pvs",
+    }
     for path in (ROOT / "ctr_pvs").rglob("*.py"):
         assert set(imported_by(path)) <= allowed, path.name
     of_the_node = {ROOT / "test" / "node", ROOT / "test" / "ros"}

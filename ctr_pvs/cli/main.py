@@ -2,6 +2,9 @@
 
 A subcommand is two functions here, one that declares its arguments and one that runs it and returns an exit code.
 Bad input is one line on standard error; standard output is for answers only.
+
+What solves is imported by the function that needs it, after the words and the robot file have been found right: it
+brings the compiler along, which takes longer than all the rest.
 """
 
 from __future__ import annotations
@@ -13,8 +16,10 @@ import sys
 from collections.abc import Callable
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 from typing import NoReturn
 
+from ctr_pvs.answer.status import Status
 from ctr_pvs.cli.report import answer_as_json
 from ctr_pvs.cli.report import answer_as_text
 from ctr_pvs.cli.stability import declare_stability
@@ -22,17 +27,12 @@ from ctr_pvs.cli.words import UsageError
 from ctr_pvs.cli.words import is_number
 from ctr_pvs.cli.words import number
 from ctr_pvs.cli.words import whole_number
-from ctr_pvs.equilibrium import Equilibrium
 from ctr_pvs.errors import FieldError
 from ctr_pvs.errors import RobotFileError
-from ctr_pvs.renda2021.figures import PictureError
-from ctr_pvs.renda2021.reproduce import as_json
-from ctr_pvs.renda2021.reproduce import as_text
-from ctr_pvs.renda2021.reproduce import reproduce
-from ctr_pvs.renda2021.reproduce import save_pictures
 from ctr_pvs.robot.file import load_robot
-from ctr_pvs.solver import EquilibriumSolver
-from ctr_pvs.status import Status
+
+if TYPE_CHECKING:
+    from ctr_pvs.answer.equilibrium import Equilibrium
 
 SUCCESS = 0
 BAD_INPUT = 2
@@ -121,6 +121,9 @@ def _declare_solve(subcommands: argparse._SubParsersAction[_Parser]) -> None:
 
 def _solve(arguments: argparse.Namespace) -> int:
     robot = load_robot(arguments.robot)
+
+    from ctr_pvs.solve.solver import EquilibriumSolver
+
     alpha = [math.radians(angle) for angle in arguments.alpha] if arguments.degrees else arguments.alpha
     solver = EquilibriumSolver(
         robot,
@@ -160,6 +163,12 @@ def _declare_reproduce(subcommands: argparse._SubParsersAction[_Parser]) -> None
 
 
 def _reproduce(arguments: argparse.Namespace) -> int:
+    from ctr_pvs.renda2021.figures import PictureError
+    from ctr_pvs.renda2021.reproduce import as_json
+    from ctr_pvs.renda2021.reproduce import as_text
+    from ctr_pvs.renda2021.reproduce import reproduce
+    from ctr_pvs.renda2021.reproduce import save_pictures
+
     reproduction = reproduce()
     print(as_json(reproduction) if arguments.json else as_text(reproduction))
     if arguments.output is None and arguments.json:

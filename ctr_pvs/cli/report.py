@@ -5,16 +5,19 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ctr_pvs.backbone import Pose
-from ctr_pvs.equilibrium import Equilibrium
+from ctr_pvs.answer.backbone import Pose
+from ctr_pvs.answer.status import NoEquilibriumError
 from ctr_pvs.renda2021.columns import aligned
 from ctr_pvs.robot.robot import Robot
-from ctr_pvs.status import NoEquilibriumError
+
+if TYPE_CHECKING:
+    from ctr_pvs.answer.equilibrium import Equilibrium
 
 LOAD_NOTE = (
     "Torque and force are what the actuators supply along +alpha and +D; +D pulls a tube back.\n"

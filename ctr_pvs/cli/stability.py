@@ -5,21 +5,19 @@ from __future__ import annotations
 import argparse
 import math
 from pathlib import Path
+from typing import TYPE_CHECKING
 from typing import Any
 
 import numpy as np
 
-from ctr_pvs.cli.stability_figures import save_pictures
-from ctr_pvs.cli.stability_report import scan_as_json
-from ctr_pvs.cli.stability_report import scan_as_text
-from ctr_pvs.cli.stability_scan import Scene
-from ctr_pvs.cli.stability_scan import scan
 from ctr_pvs.cli.words import UsageError
 from ctr_pvs.cli.words import number
 from ctr_pvs.cli.words import whole_number
-from ctr_pvs.renda2021.figures import PictureError
 from ctr_pvs.robot.file import load_robot
 from ctr_pvs.robot.robot import Robot
+
+if TYPE_CHECKING:
+    from ctr_pvs.cli.stability_scan import Scene
 
 SUCCESS, NOT_ALL_SOLVED = 0, 4
 MOST_STEPS, MOST_ROWS = 10_000, 1_000
@@ -87,6 +85,14 @@ def declare_stability(subcommands: argparse._SubParsersAction[Any]) -> None:
 
 def _stability(arguments: argparse.Namespace) -> int:
     robot = load_robot(arguments.robot)
+
+    # Only here, for they bring the compiler along: see main.
+    from ctr_pvs.cli.stability_figures import save_pictures
+    from ctr_pvs.cli.stability_report import scan_as_json
+    from ctr_pvs.cli.stability_report import scan_as_text
+    from ctr_pvs.cli.stability_scan import scan
+    from ctr_pvs.renda2021.figures import PictureError
+
     unit = math.pi / 180.0 if arguments.degrees else 1.0
     low, high = arguments.range or (0.0, TURN[arguments.degrees])
     if not low != high:
@@ -108,6 +114,8 @@ def _stability(arguments: argparse.Namespace) -> int:
 
 
 def _scene(robot: Robot, arguments: argparse.Namespace, unit: float) -> Scene:
+    from ctr_pvs.cli.stability_scan import Scene
+
     tube = _tube(robot, arguments.tube)
     alpha = [0.0] * robot.n_tubes if arguments.alpha is None else [unit * angle for angle in arguments.alpha]
     if len(alpha) == robot.n_tubes:

@@ -12,15 +12,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ctr_pvs.equilibria import tip_curve
-from ctr_pvs.equilibrium import Equilibrium
+from ctr_pvs.answer.equilibrium import Equilibrium
 from ctr_pvs.errors import FieldError
 from ctr_pvs.oracles.tip_curve import TURN
 from ctr_pvs.oracles.tip_curve import TipCurve
 from ctr_pvs.oracles.two_tubes import TwoTubes
 from ctr_pvs.oracles.two_tubes import two_tube_parameters
 from ctr_pvs.robot.robot import Robot
-from ctr_pvs.solver import EquilibriumSolver
+from ctr_pvs.solve.equilibria import tip_curve
+from ctr_pvs.solve.solver import EquilibriumSolver
 
 Array = NDArray[np.float64]
 

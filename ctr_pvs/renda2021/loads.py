@@ -25,7 +25,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from ctr_pvs.equilibrium import Equilibrium
+from ctr_pvs.answer.equilibrium import Equilibrium
 from ctr_pvs.pvs.printed_loads import printed_forces
 from ctr_pvs.renda2021.numbers import PRINTED
 from ctr_pvs.renda2021.numbers import Part
@@ -35,7 +35,7 @@ from ctr_pvs.renda2021.robots import INNER
 from ctr_pvs.renda2021.robots import OUTER
 from ctr_pvs.renda2021.robots import curved_robot
 from ctr_pvs.renda2021.shapes import solved
-from ctr_pvs.solver import EquilibriumSolver
+from ctr_pvs.solve.solver import EquilibriumSolver
 
 Stiffness: TypeAlias = tuple[float, float]
 

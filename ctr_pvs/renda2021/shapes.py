@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ctr_pvs.equilibrium import Equilibrium
+from ctr_pvs.answer.equilibrium import Equilibrium
+from ctr_pvs.answer.status import NoEquilibriumError
 from ctr_pvs.model.materials import Materials
 from ctr_pvs.model.sections import piecewise_domain
 from ctr_pvs.model.shape import Shape
@@ -28,8 +29,7 @@ from ctr_pvs.renda2021.robots import curved_robot
 from ctr_pvs.renda2021.robots import fig2_robot
 from ctr_pvs.renda2021.robots import fig4_robot
 from ctr_pvs.robot.robot import Robot
-from ctr_pvs.solver import EquilibriumSolver
-from ctr_pvs.status import NoEquilibriumError
+from ctr_pvs.solve.solver import EquilibriumSolver
 
 Array = NDArray[np.float64]
 

@@ -172,6 +172,10 @@ class Robot:
     def n_tubes(self) -> int:
         return len(self.tubes)
 
+    def length_beyond(self, D: NDArray[np.float64]) -> float:
+        """Arc length [m] from the orifice to the farthest tip at base positions ``D`` (N,) [m]."""
+        return max(0.0, max([tube.length - d for tube, d in zip(self.tubes, D.tolist(), strict=True)]))
+
     @cached_property
     def _bounds(self) -> CommandBounds:
         names, lengths = zip(*((tube.name, tube.length) for tube in self.tubes), strict=True)

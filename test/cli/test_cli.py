@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import math
 import re
@@ -196,7 +195,9 @@ def test_exit_codes(capsys, monkeypatch, status, code, output):
     true_solve = EquilibriumSolver.solve
 
     def changed_solve(self, *arguments, **options):
-        return dataclasses.replace(true_solve(self, *arguments, **options), status=status)
+        answer = true_solve(self, *arguments, **options)
+        answer.status = status
+        return answer
 
     monkeypatch.setattr(EquilibriumSolver, "solve", changed_solve)
     text = solve(capsys, ROBOT, "--alpha", "0", "1", *FIG4, *output, code=code)

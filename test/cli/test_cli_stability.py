@@ -12,8 +12,8 @@ import pytest
 
 from ctr_pvs import load_robot
 from ctr_pvs.cli import main as cli
-from ctr_pvs.equilibria import equilibria
 from ctr_pvs.oracles.two_tubes import two_tube_parameters
+from ctr_pvs.solve.equilibria import equilibria
 
 ROOT = Path(__file__).parents[2]
 ROBOT = str(ROOT / "config" / "renda2021.yaml")

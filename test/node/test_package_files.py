@@ -5,6 +5,7 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import yaml
+from setuptools import find_packages
 
 ROOT = Path(__file__).parents[2]
 WITHOUT_DEFAULT = {"robot_file", "initial_command", "rotation_limits", "translation_limits"}
@@ -106,7 +107,10 @@ def test_package_xml_names_every_ros_package_that_is_imported():
 
 
 def test_every_folder_of_python_modules_is_installed():
-    packages = set(ast.literal_eval(setup_arguments()["packages"]))
+    found = setup_arguments()["packages"]
+    assert ast.unparse(found.func) == "find_packages"
+    (include,) = (ast.literal_eval(keyword.value) for keyword in found.keywords if keyword.arg == "include")
+    packages = set(find_packages(str(ROOT), include=include))
     folders = (path.parent for top in ("ctr_pvs", "ctr_pvs_ros") for path in (ROOT / top).rglob("__init__.py"))
     assert packages == {".".join(folder.relative_to(ROOT).parts) for folder in folders}
 

@@ -11,7 +11,11 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PoseStamped
 from sensor_msgs.msg import JointState
 
-JOINTS = ["outer_rotation", "outer_translation", "inner_rotation", "inner_translation"]
+from ros.load import ENDLESS
+from ros.load import JOINTS
+from ros.load import NEAR
+from ros.load import joint_state
+
 GOOD = dict(zip(JOINTS, (0.0, 0.0935, 0.5, 0.2085), strict=True))
 REFERENCE = json.loads((Path(__file__).parents[1] / "data" / "reference_values.json").read_text(encoding="utf-8"))
 ROWS = [(sweep, row) for sweep in ("fig4_full", "fig4_partial") for row in REFERENCE[sweep]["rows"][::4]]
@@ -120,19 +124,18 @@ def test_rejections_are_logged(peer):
 
 
 def test_a_solve_that_fails_publishes_nothing(peer):
-    before = peer.client.command(GOOD, TIMEOUT)
+    before = peer.client.command(dict(zip(JOINTS, NEAR, strict=True)), TIMEOUT)
     tips = peer.subscribe(PoseStamped, "setpoint_cp")
     peer.wait(lambda: bool(tips), "last answer")
-    # A budget too small for any solve stands for all that can go wrong inside one.
+    # A budget too small stands for all that can go wrong inside a solve.
     peer.set_parameter("compute_budget", 1e-4)
-    far = {**GOOD, "inner_rotation": -3.0}
-    peer.send(JointState(name=list(far), position=list(far.values())))
+    peer.send(joint_state(JOINTS, ENDLESS))
     status, _ = peer.diagnostics(lambda values: values["last status"] == "timeout")
     peer.set_parameter("compute_budget", 1.0)
     assert tips == [before.tip]
     assert status.level == DiagnosticStatus.ERROR
     assert status.message.startswith("timeout: ")
-    assert peer.client.command(GOOD, TIMEOUT).tip.pose == before.tip.pose
+    assert peer.client.command(dict(zip(JOINTS, NEAR, strict=True)), TIMEOUT).tip.pose == before.tip.pose
 
 
 def test_diagnostics_tell_how_it_goes(peer):

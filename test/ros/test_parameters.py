@@ -8,6 +8,7 @@ from geometry_msgs.msg import PoseStamped
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
+from ctr_pvs.solve import solver
 from ctr_pvs_ros.parameters import PARAMETERS
 from ctr_pvs_ros.parameters import Settings
 
@@ -26,6 +27,11 @@ def other_value(default):
         case str():
             return f"{default}x"
     return [0.0, 0.5, 0.0935, 0.2085]
+
+
+def test_levels_and_force_models_are_those_of_the_solver():
+    assert PARAMETERS["fidelity"].choices == solver.FIDELITIES
+    assert PARAMETERS["force_model"].choices == solver.FORCE_MODELS
 
 
 @pytest.fixture(scope="module")

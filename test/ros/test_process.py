@@ -6,13 +6,15 @@ import time
 
 import pytest
 import yaml
-from sensor_msgs.msg import JointState
 
 from ctr_pvs_ros.process import NodeProcess
 from ctr_pvs_ros.process import share_file
+from ros.load import ENDLESS
+from ros.load import JOINTS
+from ros.load import NEAR
+from ros.load import joint_state
 
 ROBOT = share_file("config", "renda2021.yaml")
-JOINTS = ["outer_rotation", "outer_translation", "inner_rotation", "inner_translation"]
 LIMIT = 2.0  # s, to refuse a start and to end after a signal
 
 
@@ -70,8 +72,8 @@ def test_a_wrong_parameter_ends_start_up_with_the_reason(graph, tmp_path, parame
 def test_a_signal_ends_the_node_cleanly(start_node, number, work):
     peer = start_node(f"/ends_{work}_on_{number.name.lower()}", compute_budget="60.0")
     if work == "solving":
-        # So many turns that following them takes longer than this test.
-        peer.send(JointState(name=JOINTS, position=[0.0, 0.0935, 1e6, 0.2085]))
+        peer.client.command(dict(zip(JOINTS, NEAR, strict=True)), 5.0)
+        peer.send(joint_state(JOINTS, ENDLESS))
         time.sleep(0.5)
     began = time.monotonic()
     assert peer.process.stop(number) == 0

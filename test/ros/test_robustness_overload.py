@@ -4,11 +4,13 @@ import time
 
 import pytest
 
+from ros.load import JOINTS
+from ros.load import NEAR
 from ros.load import Load
 from ros.load import faults_in
 from ros.load import joint_state
 
-JOINTS = ["outer_rotation", "outer_translation", "inner_rotation", "inner_translation"]
+TURN = 30.0  # rad, each way
 FACTOR = 10  # commands per solve
 PROBES = 20  # commands in lock step that tell how long one takes
 SECONDS = 1.5
@@ -29,9 +31,9 @@ def load(peer):
 
 
 def command(stamp):
-    """Back and forth over 160 deg, alternately: every solve follows a long path."""
-    turn = 1.4 if stamp % 2 else -1.4
-    return joint_state(JOINTS, [-turn, 0.0935, turn, 0.2085], stamp)
+    """Back and forth over very many turns, alternately: every solve follows a long path."""
+    turn = TURN if stamp % 2 else -TURN
+    return joint_state(JOINTS, [-turn, NEAR[1], turn, NEAR[3]], stamp)
 
 
 def solve_times(load):

@@ -13,15 +13,15 @@ import yaml
 
 from ctr_pvs_ros.process import NodeProcess
 from ctr_pvs_ros.process import share_file
+from ros.load import ENDLESS
+from ros.load import JOINTS
+from ros.load import NEAR
 from ros.load import children
 from ros.load import faults_in
 from ros.load import joint_state
 
 ROBOT = share_file("config", "renda2021.yaml")
-JOINTS = ["outer_rotation", "outer_translation", "inner_rotation", "inner_translation"]
 LIMIT = 2.0  # s, to refuse a start and to end after a signal
-# So many turns that following them takes longer than any of these tests.
-ENDLESS = [0.0, 0.0935, 1e6, 0.2085]
 
 
 def edited(*changes):
@@ -86,6 +86,7 @@ def test_a_wrong_robot_file_never_opens_an_output(graph, tmp_path, start_node):
 def test_ten_stops_in_mid_solve(start_node, number):
     for count in range(10):
         peer = start_node(f"/mid_solve_{number.name.lower()}_{count}", compute_budget="60.0")
+        peer.client.command(dict(zip(JOINTS, NEAR, strict=True)), 5.0)
         peer.send(joint_state(JOINTS, ENDLESS))
         time.sleep(0.1 + 0.05 * count)
         began = time.monotonic()
@@ -125,6 +126,7 @@ def test_nothing_is_left_in_shared_memory(start_node):
 def test_impatience_does_not_spoil_a_clean_end(start_node):
     """Ctrl-C again and again, as people do."""
     peer = start_node("/impatient", compute_budget="60.0")
+    peer.client.command(dict(zip(JOINTS, NEAR, strict=True)), 5.0)
     peer.send(joint_state(JOINTS, ENDLESS))
     time.sleep(0.2)
     began = time.monotonic()

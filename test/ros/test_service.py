@@ -14,12 +14,15 @@ from sensor_msgs.msg import JointState
 
 from ctr_pvs_interfaces.srv import SolveEquilibrium
 from ctr_pvs_ros.client import NoReply
+from ros.load import ENDLESS
+from ros.load import JOINTS
+from ros.load import NEAR
+from ros.load import faults_in
 
-JOINTS = ["outer_rotation", "outer_translation", "inner_rotation", "inner_translation"]
 POSITIONS = [0.0, 0.0935, math.radians(100), 0.2085]
 TIMEOUT = 5.0
-ENDLESS = [0.0, 0.0935, 1e6, 0.2085]  # so many turns that following them ends with the budget
 GRACE = 0.1  # s, over the budget
+LIMIT = 2.0  # s, to end after a signal
 
 
 @pytest.fixture(scope="module")
@@ -28,8 +31,9 @@ def peer(start_node):
     return start_node("/service", merge_partial="true", clamp_to_limits="true")
 
 
-def request_for(positions):
-    return SolveEquilibrium.Request(joints=JointState(name=JOINTS, position=list(positions)))
+def endless_request():
+    """One that ends with its budget, once the service has been at NEAR."""
+    return SolveEquilibrium.Request(joints=JointState(name=JOINTS, position=ENDLESS), warm_start=True)
 
 
 def call(peer, names=JOINTS, positions=POSITIONS, **fields):
@@ -99,18 +103,21 @@ def test_bad_input_is_answered_with_the_reason(peer, names, positions, poses, wo
     assert math.isnan(response.stability_margin)
 
 
-def test_the_stream_is_not_disturbed(peer):
+def test_the_stream_is_not_disturbed(start_node):
+    """Of two nodes that are told the same, one is asked beside it: they answer the same, to the last bit."""
+    asked, left_alone = start_node("/asked_beside"), start_node("/left_alone")
     command = dict(zip(JOINTS, POSITIONS, strict=True))
-    peer.client.command({**command, "inner_rotation": 1.0}, TIMEOUT)
-    before = peer.client.command(command, TIMEOUT)
-    _, counts = peer.diagnostics()
-    call(peer, positions=[0.0, 0.0935, -2.0, 0.1705], warm_start=True)
-    call(peer, positions=[0.0, 0.0935, math.nan, 0.2085])
-    _, counts_after = peer.diagnostics()
+    for angle in (1.0, 1.7, 1.0, -0.5):
+        call(asked, positions=[0.0, 0.0935, -2.0, 0.1705], warm_start=True)
+        call(asked, positions=[0.0, 0.0935, math.nan, 0.2085])
+        there, here = (
+            peer.client.command({**command, "inner_rotation": angle}, TIMEOUT) for peer in (asked, left_alone)
+        )
+        assert there.tip.pose == here.tip.pose
+        assert there.joints.effort == here.joints.effort
+    (_, counts), (_, counts_alone) = asked.diagnostics(), left_alone.diagnostics()
     for key in ("commands accepted", "commands rejected", "answers published"):
-        assert counts[key] == counts_after[key]
-    peer.client.command({**command, "inner_rotation": 1.0}, TIMEOUT)
-    assert peer.client.command(command, TIMEOUT).tip.pose == before.tip.pose
+        assert counts[key] == counts_alone[key]
 
 
 def test_a_service_whose_process_dies_comes_back(peer):
@@ -124,7 +131,9 @@ def test_a_service_whose_process_dies_comes_back(peer):
     peer.wait(lambda: processes() not in ([], [child]), "a new process")
     for _ in range(20):  # the dead one is believed to be there for some time, and requests go to it
         with suppress(NoReply):
-            if peer.client.solve(request_for(POSITIONS), 0.5).success:
+            if peer.client.solve(
+                SolveEquilibrium.Request(joints=JointState(name=JOINTS, position=POSITIONS)), 0.5
+            ).success:
                 break
     else:
         pytest.fail("the service does not come back")
@@ -141,18 +150,19 @@ def test_parameters_reach_the_service(peer):
     assert call(peer).success
 
 
-def ask_at_once(peer, budget, clients):
+def ask_at_once(peer, clients):
     """Ask for many times as much as the budget allows, one request a bad one; how long each answer took [s]."""
-    requests = [request_for(ENDLESS) for _ in range(clients)]
+    requests = [endless_request() for _ in range(clients)]
     requests[3].joints.position[0] = math.nan
-    began, ends, answers = time.monotonic(), {}, {}
+    begins, ends, answers = {}, {}, {}
     ask = peer.ros.create_client(SolveEquilibrium, "ctr_equilibrium/solve")
     peer.wait(ask.service_is_ready, "service")
 
     def keep(number, future):
-        ends[number], answers[number] = time.monotonic() - began, future.result()
+        ends[number], answers[number] = time.monotonic() - begins[number], future.result()
 
     for number, request in enumerate(requests):
+        begins[number] = time.monotonic()
         ask.call_async(request).add_done_callback(partial(keep, number))
     peer.wait(lambda: len(answers) == clients, "answers")
     assert [answers[number].status for number in range(clients)].count("timeout") == clients - 1
@@ -164,14 +174,29 @@ def test_many_clients_at_once_are_all_answered_in_time(start_node):
     """None waits longer than the budget. A busy machine may hold up the asking itself, so there are three tries."""
     budget, clients = 0.3, 6
     peer = start_node("/crowded", compute_budget=str(budget))
-    assert call(peer).success
+    assert call(peer, positions=NEAR).success
     tries = []
     for _ in range(3):
-        ends = ask_at_once(peer, budget, clients)
+        ends = ask_at_once(peer, clients)
         tries.append((ends.pop(3), max(ends.values())))
         if tries[-1][0] < budget and tries[-1][1] < budget + GRACE:
             return
     raise AssertionError(f"bad and endless requests took {tries} s of a budget of {budget} s")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_the_end_of_the_node_does_not_wait_for_requests(start_node, number):
+    peer = start_node(f"/asked_and_ended_by_{number.name.lower()}", compute_budget="60.0")
+    assert call(peer, positions=NEAR).success
+    ask = peer.ros.create_client(SolveEquilibrium, "ctr_equilibrium/solve")
+    peer.wait(ask.service_is_ready, "service")
+    futures = [ask.call_async(endless_request()) for _ in range(3)]
+    time.sleep(0.5)
+    began = time.monotonic()
+    assert peer.process.stop(number) == 0
+    assert time.monotonic() - began < LIMIT
+    assert not any(future.done() for future in futures)
+    assert faults_in(peer.log) == []
 
 
 def test_the_service_ends_with_a_node_that_is_killed(start_node):

@@ -1,0 +1,303 @@
+"""One robot and one tolerance, ready for the kernel: its arrays, and a workspace for each thread that asks.
+
+This is the one place where Python meets the kernel.  Arguments become contiguous arrays of floats here; a call that
+finds its workspace too small is repeated with a larger one, so nothing is sized by a guess.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ctr_pvs.kernel import entries
+from ctr_pvs.kernel import outputs
+from ctr_pvs.kernel.arrays import CAPACITIES
+from ctr_pvs.kernel.arrays import ELEMENTS
+from ctr_pvs.kernel.arrays import FACTORS
+from ctr_pvs.kernel.arrays import NODES
+from ctr_pvs.kernel.arrays import SECTIONS
+from ctr_pvs.kernel.arrays import STATE
+from ctr_pvs.kernel.arrays import UNKNOWNS
+from ctr_pvs.kernel.arrays import workspace_sizes
+from ctr_pvs.kernel.walk.step import NOT_PROVEN
+from ctr_pvs.kernel.walk.step import TOO_SMALL
+from ctr_pvs.model.packing import packed_robot
+from ctr_pvs.model.packing import quadrature_rules
+from ctr_pvs.robot.robot import Robot
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Code = int
+
+#: Room for unknowns of a state to begin with, for each tube.
+FIRST_UNKNOWNS = 48
+
+
+class Workspace:
+    """The arrays that the kernel works in, of a capacity that only grows."""
+
+    def __init__(self, tubes: int, sections: int) -> None:
+        self.tubes = tubes
+        self.capacity = np.zeros(CAPACITIES, dtype=np.int64)
+        self.capacity[SECTIONS], self.capacity[ELEMENTS] = sections, sections
+        self.capacity[NODES], self.capacity[UNKNOWNS] = 12 * sections, 20 * tubes * sections
+        self.capacity[FACTORS] = sections * (8 * tubes) ** 2
+        self._allocate()
+
+    def _allocate(self) -> None:
+        floats, ints = workspace_sizes(self.tubes, self.capacity)
+        self.floats, self.ints = np.zeros(floats), np.zeros(ints, dtype=np.int64)
+        self.ints[:CAPACITIES] = self.capacity
+
+    def grow(self) -> bool:
+        """Takes on what a call has found missing; false if the workspace was not too small."""
+        if self.ints[SECTIONS] >= 0:
+            return False
+        wanted = self.ints[:CAPACITIES].copy()
+        wanted[SECTIONS] = self.capacity[SECTIONS]
+        # Half as much again: along a path elements come and go.
+        self.capacity = np.maximum(self.capacity, wanted + wanted // 2)
+        self.capacity[SECTIONS] = wanted[SECTIONS]
+        self._allocate()
+        return True
+
+
+class Engine:
+    """Calls the kernel for ``robot`` within ``tolerance`` [m].
+
+    A state of the kernel is a vector (see ``kernel.arrays``) that means something to engines of equal robot and
+    tolerance only.
+    """
+
+    def __init__(self, robot: Robot, tolerance: float) -> None:
+        self.robot, self.tolerance = robot, tolerance
+        self.tubes, self.segments = packed_robot(robot)
+        self.rules = quadrature_rules()
+        self.state_size = STATE + (3 + FIRST_UNKNOWNS) * robot.n_tubes
+        self._local = threading.local()
+        self._relaxed_gain: tuple[bytes, float] | None = None
+
+    @property
+    def workspace(self) -> Workspace:
+        """That of the calling thread."""
+        try:
+            work: Workspace = self._local.workspace
+        except AttributeError:
+            work = self._local.workspace = Workspace(self.robot.n_tubes, int(self.segments.sum()) + 1)
+        return work
+
+    def fixed(self) -> tuple[Array, Ints, Array, Array, Ints]:
+        """What every call of the kernel begins with."""
+        work = self.workspace
+        return self.tubes, self.segments, self.rules, work.floats, work.ints
+
+    def repeat(self, call: Callable[[], Code]) -> Code:
+        """What ``call`` returns, called again with more room as often as it asks for it."""
+        while (code := call()) == TOO_SMALL:
+            self.grow()
+        return code
+
+    def grow(self) -> None:
+        """More room for the workspace, or else for states."""
+        if not self.workspace.grow():
+            self.state_size = 2 * self.state_size
+
+    def advance(self, last: Array, alpha: Array, D: Array, untwisted: bool) -> tuple[Code, Array]:
+        """One proven step from the state ``last``: see ``entries.advance``."""
+        while True:
+            out = np.empty(self.state_size)
+            work = self.workspace
+            code = entries.advance(
+                self.tubes, self.segments, self.rules, work.floats, work.ints, last, alpha, D, self.tolerance,
+                untwisted, out,
+            )  # fmt: skip
+            if code != TOO_SMALL:
+                return code, out
+            self.grow()
+
+    def cold_start(self, alpha: Array, D: Array, untwisted: bool) -> tuple[Code, Array]:
+        """See ``cold.cold``."""
+        out, codes = np.empty((1, 0)), np.empty(1, dtype=np.int64)
+
+        def call() -> Code:
+            nonlocal out
+            out, codes[0] = np.empty((1, self.state_size)), -1
+            return entries.cold_rows(
+                *self.fixed(), alpha[None], D[None], self.tolerance, untwisted, self.room(), out, codes
+            )
+
+        self.repeat(call)
+        return int(codes[0]), out[0]
+
+    def cold_rows(self, alpha: Array, D: Array, untwisted: bool, out: Array, codes: Ints) -> None:
+        """See ``entries.cold_rows``."""
+        self.repeat(
+            lambda: entries.cold_rows(*self.fixed(), alpha, D, self.tolerance, untwisted, self.room(), out, codes)
+        )
+
+    def room(self) -> Array:
+        """(4, L) where a cold start works."""
+        room: Array | None = getattr(self._local, "room", None)
+        if room is None or room.shape[1] < self.state_size:
+            room = self._local.room = np.zeros((4, self.state_size))
+        return room
+
+    def untwisted(self, alpha: Array, D: Array) -> tuple[Code, Array]:
+        """See ``entries.untwisted_state``."""
+        out = np.empty(0)
+
+        def call() -> Code:
+            nonlocal out
+            out = np.empty(self.state_size)
+            return entries.untwisted_state(*self.fixed(), alpha, D, self.tolerance, out)
+
+        return self.repeat(call), out
+
+    def settle(self, state: Array, untwisted: bool) -> tuple[Code, Array]:
+        """See ``cold.settle_down``."""
+        out = np.empty(0)
+
+        def call() -> Code:
+            nonlocal out
+            out = np.empty(self.state_size)
+            return entries.settle_state(*self.fixed(), state, self.tolerance, untwisted, out)
+
+        return self.repeat(call), out
+
+    def relaxed(self, D: Array, degree: int) -> tuple[Code, Array]:
+        """See ``entries.relaxed_state``."""
+        out, work = np.empty(0), np.empty((7, self.robot.n_tubes))
+
+        def call() -> Code:
+            nonlocal out
+            out = np.empty(self.state_size)
+            return entries.relaxed_state(*self.fixed(), D, self.tolerance, degree, work, out)
+
+        return self.repeat(call), out
+
+    def follow(
+        self, begin: Array, end: Array, clock: Array, degree: int, tries: int, state: Array
+    ) -> tuple[Code, Array]:
+        """See ``path.follow``; the state on the path."""
+        command = np.empty(2 * self.robot.n_tubes)
+
+        def call() -> Code:
+            nonlocal state
+            size = max(self.state_size, len(state))  # read once: other threads may make states grow
+            if len(state) != size:
+                state = np.concatenate([state, np.zeros(size - len(state))])
+            ahead = np.empty(size)
+            return entries.follow_path(
+                *self.fixed(), begin, end, clock, self.tolerance, degree, tries, state, ahead, command
+            )
+
+        state = state.copy()
+        return self.repeat(call), state
+
+    def land(
+        self, state: Array, command: Array, clock: Array, degree: int, steps: int, out: Array
+    ) -> tuple[Code, Array]:
+        """See ``entries.land``; ``out`` is where the flow has come so far, empty to begin with."""
+
+        def call() -> Code:
+            nonlocal out
+            size = max(self.state_size, len(out))
+            if len(out) != size:
+                out = np.concatenate([out, np.zeros(size - len(out))])
+            return entries.land(*self.fixed(), state, command, clock, self.tolerance, degree, steps, out)
+
+        return self.repeat(call), out
+
+    def margin(self, state: Array) -> float:
+        """Stability margin of a state; -1 if it is not stable."""
+        while np.isnan(value := outputs.margin(*self.fixed(), state, self.tolerance)):
+            self.grow()
+        return float(value)
+
+    def loads(self, state: Array) -> Array:
+        """See ``outputs.loads``."""
+        out = np.zeros((6, self.robot.n_tubes))
+        self.repeat(lambda: outputs.loads(*self.fixed(), state, self.tolerance, out))
+        return out
+
+    def rates(self, state: Array) -> tuple[Code, Array, Array]:
+        """Jacobian (6, 2 N) and turns of the tubes' ends by alpha (N, N): see ``outputs.jacobian``."""
+        N = self.robot.n_tubes
+        out, gain = np.zeros((2 * N, 6)), np.zeros((N, N))
+        code = self.repeat(lambda: outputs.jacobian(*self.fixed(), state, self.tolerance, out, gain))
+        return code, out.T, gain
+
+    def relaxed_gain(self, D: Array, degree: int) -> float:
+        """det(d psi_tip / d alpha) of the relaxed robot at D (N,); NaN if no relaxed state was found.  That of the last
+        D is kept: at one D it is asked for again and again."""
+        kept = self._relaxed_gain
+        key = D.tobytes()
+        if kept is None or kept[0] != key:
+            code, state = self.relaxed(D, degree)
+            gain = float("nan") if code == NOT_PROVEN else float(np.linalg.det(self.rates(state)[2]))
+            kept = self._relaxed_gain = key, gain
+        return kept[1]
+
+    def poses(self, state: Array, s: Array, tube: int = -1) -> tuple[Array, Array]:
+        """See ``outputs.backbone``."""
+        position, orientation = np.empty((len(s), 3)), np.empty((len(s), 4))
+        self.repeat(lambda: outputs.backbone(*self.fixed(), state, self.tolerance, tube, s, position, orientation))
+        return position, orientation
+
+    def angles(self, state: Array, s: Array) -> tuple[Array, Array]:
+        """psi (n, N) [rad] and torques (n, N) [N m] at arc lengths s (n,) [m]: see ``outputs.angles``."""
+        N = self.robot.n_tubes
+        psi, torque = np.empty((len(s), N)), np.empty((len(s), N))
+        self.repeat(lambda: outputs.angles(*self.fixed(), state, self.tolerance, s, psi, torque))
+        return psi, torque
+
+    def elements(self, state: Array) -> Array:
+        """(M, 4) start and end [m], 1 where tubes are coupled, degree: see ``outputs.elements``."""
+        out = np.empty((0, 4))
+        while (count := outputs.elements(*self.fixed(), state, self.tolerance, out)) != len(out):
+            if count < 0:
+                self.grow()
+            else:
+                out = np.empty((count, 4))
+        return out
+
+    def describe(self, state: Array) -> Array:
+        """See ``outputs.describe``."""
+        out = np.empty(0)
+
+        def call() -> Code:
+            nonlocal out
+            out = np.empty(self.state_size)
+            return outputs.describe(*self.fixed(), state, self.tolerance, out)
+
+        self.repeat(call)
+        return out
+
+    def blank(self, alpha: Array, D: Array, degree: int) -> Array:
+        """See ``entries.blank_state``."""
+        out = np.empty(0)
+
+        def call() -> Code:
+            nonlocal out
+            out = np.empty(self.state_size)
+            return entries.blank_state(*self.fixed(), alpha, D, self.tolerance, degree, out)
+
+        self.repeat(call)
+        return out
+
+    def dense_map(self, state: Array, unknowns: int) -> tuple[Array, NDArray[np.complex128], Array, Array]:
+        """Angle map (G N, U), moment (G, N), share and place (G,): see ``outputs.dense_map``."""
+        N, count = self.robot.n_tubes, 0
+        while True:
+            out, moment = np.empty((count * N, unknowns)), np.empty((count, N), dtype=complex)
+            share, place = np.empty(count), np.empty(count)
+            found = outputs.dense_map(*self.fixed(), state, self.tolerance, out, moment, share, place)
+            if found == count:
+                return out, moment, share, place
+            if found < 0:
+                self.grow()
+            else:
+                count = found

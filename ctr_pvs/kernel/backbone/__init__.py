@@ -1,0 +1,1 @@
+"""Frames, poses, and how far a change of the unknowns moves them."""

@@ -1,0 +1,231 @@
+"""The functions of the kernel that the rest of the package calls.
+
+All take the same five arrays first: tubes, segments (the robot), rules, floats, ints (one thread's workspace); see
+``arrays``.  TOO_SMALL means that the workspace must grow to what ``ints`` then says, and the call be repeated.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ctr_pvs.kernel.arrays import N_UNKNOWNS
+from ctr_pvs.kernel.arrays import OTHER
+from ctr_pvs.kernel.arrays import RIGID
+from ctr_pvs.kernel.arrays import STATE
+from ctr_pvs.kernel.arrays import TWISTED
+from ctr_pvs.kernel.arrays import Array
+from ctr_pvs.kernel.arrays import Ints
+from ctr_pvs.kernel.arrays import Kit
+from ctr_pvs.kernel.arrays import Y
+from ctr_pvs.kernel.arrays import bench_of
+from ctr_pvs.kernel.arrays import scene_of
+from ctr_pvs.kernel.carry import carry
+from ctr_pvs.kernel.carry import drop_finer
+from ctr_pvs.kernel.compiler import compiled
+from ctr_pvs.kernel.compiler import entry_point
+from ctr_pvs.kernel.layout import FINER
+from ctr_pvs.kernel.layout import holds
+from ctr_pvs.kernel.layout import prepare
+from ctr_pvs.kernel.twist.condensation import factorize
+from ctr_pvs.kernel.twist.element import EXACT
+from ctr_pvs.kernel.twist.element import energy_gradient
+from ctr_pvs.kernel.twist.element import energy_value
+from ctr_pvs.kernel.twist.flow import AT_REST
+from ctr_pvs.kernel.twist.flow import NUDGE
+from ctr_pvs.kernel.twist.flow import flow
+from ctr_pvs.kernel.twist.flow import soften
+from ctr_pvs.kernel.twist.newton import twist_size
+from ctr_pvs.kernel.twist.relaxed import relax
+from ctr_pvs.kernel.walk.cold import cold
+from ctr_pvs.kernel.walk.cold import raise_degrees
+from ctr_pvs.kernel.walk.cold import settle_down
+from ctr_pvs.kernel.walk.path import follow
+from ctr_pvs.kernel.walk.step import MORE
+from ctr_pvs.kernel.walk.step import NOT_PROVEN
+from ctr_pvs.kernel.walk.step import OK
+from ctr_pvs.kernel.walk.step import TOO_SMALL
+from ctr_pvs.kernel.walk.step import finish
+from ctr_pvs.kernel.walk.step import open_state
+from ctr_pvs.kernel.walk.step import step
+from ctr_pvs.kernel.walk.step import write_state
+
+WORKSPACE = "float64[:, :, ::1], int64[::1], float64[:, :, ::1], float64[::1], int64[::1]"
+
+
+@entry_point(f"int64({WORKSPACE}, float64[::1], float64[::1], float64[::1], float64, boolean, float64[::1])")
+def advance(
+    tubes: Array, segments: Ints, rules: Array, floats: Array, ints: Ints, last: Array, alpha: Array, D: Array,
+    tolerance: float, untwisted: bool, out: Array,
+) -> int:  # fmt: skip
+    """From the state ``last`` to the command (alpha, D) in one proven step, at the smallest degrees that meet
+    ``tolerance`` [m]; see ``step.step``."""
+    kit = Kit(tubes, segments, rules, floats, ints)
+    came = step(kit, last, alpha, D, tolerance, 0, 0, 0.0, untwisted, True, out)
+    return raise_degrees(kit, alpha, D, tolerance, came, out)
+
+
+@entry_point(f"int64({WORKSPACE}, float64[::1], float64, boolean, float64[::1])")
+def settle_state(
+    tubes: Array, segments: Ints, rules: Array, floats: Array, ints: Ints, state: Array, tolerance: float,
+    untwisted: bool, out: Array,
+) -> int:  # fmt: skip
+    """See ``cold.settle_down``."""
+    kit = Kit(tubes, segments, rules, floats, ints)
+    return settle_down(kit, state, tolerance, untwisted, out)
+
+
+@entry_point(f"int64({WORKSPACE}, float64[::1], float64[::1], float64, float64[::1])")
+def untwisted_state(
+    tubes: Array, segments: Ints, rules: Array, floats: Array, ints: Ints, alpha: Array, D: Array, tolerance: float,
+    out: Array,
+) -> int:  # fmt: skip
+    """The state without twist at (alpha, D), eq. (28)-(31), and the estimate of what it neglects; NOT_PROVEN where it
+    is not stable."""
+    kit = Kit(tubes, segments, rules, floats, ints)
+    scene, bench = scene_of(kit, 0), bench_of(kit)
+    if not prepare(kit, scene, D, tolerance, 0, 0):
+        return TOO_SMALL
+    for u in range(scene.counts[N_UNKNOWNS]):
+        scene.vectors[Y, u] = 0.0
+    energy_gradient(scene, rules, alpha)
+    if not factorize(scene, bench, rules, 1, EXACT, 0.0, 0.0, -1.0):
+        return NOT_PROVEN
+    if not write_state(scene, alpha, 0, RIGID, out):
+        return TOO_SMALL
+    finish(scene, bench, tubes, rules, alpha, math.inf, tolerance, out)
+    return OK
+
+
+@entry_point(
+    f"int64({WORKSPACE}, float64[::1], float64[::1], float64[::1], float64, int64, int64, float64[::1], float64[::1], "
+    "float64[::1])"
+)
+def follow_path(
+    tubes: Array, segments: Ints, rules: Array, floats: Array, ints: Ints, begin: Array, end: Array, clock: Array,
+    tolerance: float, floor: int, most: int, state: Array, ahead: Array, command: Array,
+) -> int:  # fmt: skip
+    """See ``path.follow``; ``floor`` : least degree."""
+    kit = Kit(tubes, segments, rules, floats, ints)
+    return follow(
+        kit, begin, end, clock, tolerance, 0, floor, most, state, ahead, command
+    )  # fmt: skip
+
+
+@entry_point(f"int64({WORKSPACE}, float64[::1], float64, int64, float64[:, ::1], float64[::1])")
+def relaxed_state(
+    tubes: Array, segments: Ints, rules: Array, floats: Array, ints: Ints, D: Array, tolerance: float, floor: int,
+    work: Array, out: Array,
+) -> int:  # fmt: skip
+    """The relaxed robot at D: OK, MORE if others are as near to zero base angles, NOT_PROVEN if none was found.
+
+    work (7, N) : room."""
+    kit = Kit(tubes, segments, rules, floats, ints)
+    scene, bench = scene_of(kit, 0), bench_of(kit)
+    if not prepare(kit, scene, D, tolerance, 0, floor):
+        return TOO_SMALL
+    found = relax(scene, bench, rules, work[6], work)
+    if found == 0:
+        return NOT_PROVEN
+    if not write_state(scene, work[6], 0, TWISTED, out):
+        return TOO_SMALL
+    return OK if found == 1 else MORE
+
+
+@entry_point(f"int64({WORKSPACE}, float64[::1], float64[::1], float64[::1], float64, int64, int64, float64[::1])")
+def land(
+    tubes: Array, segments: Ints, rules: Array, floats: Array, ints: Ints, state: Array, command: Array, clock: Array,
+    tolerance: float, floor: int, most: int, out: Array,
+) -> int:  # fmt: skip
+    """Where the gradient flow from ``state`` lands at ``command`` (2 N,), just past the fold, into ``out``.
+
+    OK at a stable equilibrium; NOT_PROVEN if the state is still held there, or does not come to rest; MORE if there is
+    more to go after ``most`` steps: then ``out`` is where it is.  clock (5,) : see ``flow.flow``, to begin with zeros;
+    then energies [J] before and after.
+    """
+    kit = Kit(tubes, segments, rules, floats, ints)
+    N = len(segments)
+    alpha, D = command[:N], command[N:]
+    begun = clock[2] > 0.0
+    came = step_aside(kit, out if begun else state, alpha, D, tolerance, floor)
+    if came < 0:
+        return TOO_SMALL
+    scene, bench = scene_of(kit, came), bench_of(kit)
+    drop_finer(scene, FINER)  # the path was followed without them, and its landing is to be
+    if not begun:
+        clock[0], clock[1], clock[2], clock[3] = 0.0, 0.1, AT_REST, energy_value(scene, rules, alpha)
+        soften(scene, bench, rules, alpha)
+        for u in range(scene.counts[N_UNKNOWNS]):
+            scene.vectors[Y, u] += scene.vectors[OTHER, u]
+    ended = flow(scene, bench, rules, alpha, clock, most)
+    if not write_state(scene, alpha, 0, TWISTED, out):
+        clock[2] = 0.0
+        return TOO_SMALL
+    if ended < 1:
+        return MORE if ended == 0 else NOT_PROVEN
+    clock[4] = energy_value(scene, rules, alpha)
+    came = step_aside(kit, state, alpha, D, tolerance, floor)
+    if came < 0:
+        return TOO_SMALL
+    scene = scene_of(kit, came)
+    for u in range(scene.counts[N_UNKNOWNS]):
+        scene.vectors[OTHER, u] = out[STATE + 3 * N + u] - scene.vectors[Y, u]
+    return OK if twist_size(scene, scene.vectors[OTHER], 1) > NUDGE else NOT_PROVEN
+
+
+@compiled
+def step_aside(
+    kit: Kit, state: Array, alpha: Array, D: Array,
+    tolerance: float, floor: int,
+) -> int:  # fmt: skip
+    """Carries ``state`` to the command (alpha, D) as it is; the scene that then holds it, -1 if the workspace is too
+    small."""
+    from_scene = open_state(kit, state, tolerance)
+    if from_scene < 0:
+        return -1
+    old, new = scene_of(kit, from_scene), scene_of(kit, 1 - from_scene)
+    if holds(old, D, 0, floor):
+        return from_scene
+    if not prepare(kit, new, D, tolerance, 0, floor):
+        return -1
+    carry(old, new, kit.rules)
+    return 1 - from_scene
+
+
+@entry_point(f"int64({WORKSPACE}, float64[::1], float64[::1], float64, int64, float64[::1])")
+def blank_state(
+    tubes: Array, segments: Ints, rules: Array, floats: Array, ints: Ints, alpha: Array, D: Array, tolerance: float,
+    floor: int, out: Array,
+) -> int:  # fmt: skip
+    """A state at (alpha, D) with degrees of at least ``floor`` and no twist, not solved for."""
+    kit = Kit(tubes, segments, rules, floats, ints)
+    scene = scene_of(kit, 0)
+    if not prepare(kit, scene, D, tolerance, 0, floor):
+        return TOO_SMALL
+    for u in range(scene.counts[N_UNKNOWNS]):
+        scene.vectors[Y, u] = 0.0
+    return OK if write_state(scene, alpha, 0, TWISTED, out) else TOO_SMALL
+
+
+@entry_point(
+    f"int64({WORKSPACE}, float64[:, ::1], float64[:, ::1], float64, boolean, float64[:, ::1], float64[:, ::1], "
+    "int64[::1])"
+)
+def cold_rows(
+    tubes: Array, segments: Ints, rules: Array, floats: Array, ints: Ints, alpha: Array, D: Array, tolerance: float,
+    untwisted: bool, room: Array, out: Array, codes: Ints,
+) -> int:  # fmt: skip
+    """Cold starts at the commands alpha, D (M, N): the first columns of their states into ``out`` (M, STATE + 3 N), and
+    what ``cold.cold`` says into codes (M,).  Rows whose code is not -1 are passed over, so that a TOO_SMALL call can be
+    repeated."""
+    kit = Kit(tubes, segments, rules, floats, ints)
+    for row in range(len(alpha)):
+        if codes[row] >= 0:
+            continue
+        state = room[3]
+        came = cold(kit, alpha[row], D[row], tolerance, untwisted, room, state)
+        if came == TOO_SMALL:
+            return TOO_SMALL
+        codes[row] = came
+        for i in range(min(out.shape[1], len(state))):
+            out[row, i] = state[i]
+    return OK

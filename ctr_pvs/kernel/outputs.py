@@ -1,0 +1,265 @@
+"""Entry points that read a state: everything an answer tells.  Arguments are as in ``entries``."""
+
+from __future__ import annotations
+
+import math
+
+from ctr_pvs.kernel.actuation import actuation_loads
+from ctr_pvs.kernel.actuation import twist_rates
+from ctr_pvs.kernel.arrays import ALPHA_RATE
+from ctr_pvs.kernel.arrays import ANGLE
+from ctr_pvs.kernel.arrays import ANSWERED
+from ctr_pvs.kernel.arrays import ARC
+from ctr_pvs.kernel.arrays import COUPLED
+from ctr_pvs.kernel.arrays import D_RATE
+from ctr_pvs.kernel.arrays import DEGREE
+from ctr_pvs.kernel.arrays import EXPLICIT
+from ctr_pvs.kernel.arrays import FIRST
+from ctr_pvs.kernel.arrays import GAUSS
+from ctr_pvs.kernel.arrays import INTEGRAL
+from ctr_pvs.kernel.arrays import LEADER
+from ctr_pvs.kernel.arrays import N_ELEMENTS
+from ctr_pvs.kernel.arrays import N_UNKNOWNS
+from ctr_pvs.kernel.arrays import NONE
+from ctr_pvs.kernel.arrays import PLACE
+from ctr_pvs.kernel.arrays import REST
+from ctr_pvs.kernel.arrays import RIGID
+from ctr_pvs.kernel.arrays import ROOT
+from ctr_pvs.kernel.arrays import ROW
+from ctr_pvs.kernel.arrays import S_ESTIMATE
+from ctr_pvs.kernel.arrays import S_STEPS
+from ctr_pvs.kernel.arrays import S_TWISTS
+from ctr_pvs.kernel.arrays import SCALE
+from ctr_pvs.kernel.arrays import SIZE
+from ctr_pvs.kernel.arrays import STATE
+from ctr_pvs.kernel.arrays import STIFFNESS
+from ctr_pvs.kernel.arrays import TORQUE
+from ctr_pvs.kernel.arrays import TURNED_BY
+from ctr_pvs.kernel.arrays import TWISTED
+from ctr_pvs.kernel.arrays import WEIGHT
+from ctr_pvs.kernel.arrays import Array
+from ctr_pvs.kernel.arrays import Complex
+from ctr_pvs.kernel.arrays import Ints
+from ctr_pvs.kernel.arrays import Kit
+from ctr_pvs.kernel.arrays import Y
+from ctr_pvs.kernel.arrays import bench_of
+from ctr_pvs.kernel.arrays import scene_of
+from ctr_pvs.kernel.backbone.frames import bend
+from ctr_pvs.kernel.backbone.frames import chain
+from ctr_pvs.kernel.backbone.frames import is_framed
+from ctr_pvs.kernel.backbone.poses import trace
+from ctr_pvs.kernel.carry import angle_at
+from ctr_pvs.kernel.carry import guide_torque
+from ctr_pvs.kernel.carry import torque_at
+from ctr_pvs.kernel.compiler import entry_point
+from ctr_pvs.kernel.entries import WORKSPACE
+from ctr_pvs.kernel.sensitivity import answer_rates
+from ctr_pvs.kernel.sensitivity import answered_ends
+from ctr_pvs.kernel.sensitivity import tip_rates
+from ctr_pvs.kernel.twist.condensation import factorize
+from ctr_pvs.kernel.twist.element import EXACT
+from ctr_pvs.kernel.twist.element import energy_gradient
+from ctr_pvs.kernel.twist.element import spread_angles
+from ctr_pvs.kernel.walk.path import margin_of
+from ctr_pvs.kernel.walk.step import NOT_PROVEN
+from ctr_pvs.kernel.walk.step import OK
+from ctr_pvs.kernel.walk.step import TOO_SMALL
+from ctr_pvs.kernel.walk.step import open_state
+from ctr_pvs.kernel.walk.step import put_tip
+from ctr_pvs.kernel.walk.step import write_state
+
+
+@entry_point(f"float64({WORKSPACE}, float64[::1], float64)")
+def margin(
+    tubes: Array, segments: Ints, rules: Array, floats: Array, ints: Ints, state: Array, tolerance: float
+) -> float:
+    """The stability margin of ``state``; NaN if the workspace is too small."""
+    kit = Kit(tubes, segments, rules, floats, ints)
+    return margin_of(kit, state, tolerance)
+
+
+@entry_point(f"int64({WORKSPACE}, float64[::1], float64, float64[:, ::1])")
+def loads(
+    tubes: Array, segments: Ints, rules: Array, floats: Array, ints: Ints, state: Array, tolerance: float, out: Array
+) -> int:
+    """Actuation loads and energy of ``state`` into out (6, N): torque, force towards +D and -D, kinks; then elastic
+    energy [J] and stability margin."""
+    kit = Kit(tubes, segments, rules, floats, ints)
+    N = len(segments)
+    which = open_state(kit, state, tolerance)
+    if which < 0:
+        return TOO_SMALL
+    scene, bench = scene_of(kit, which), bench_of(kit)
+    spread_angles(scene, state[STATE : STATE + N], scene.vectors[Y])
+    bend(scene, rules, bench.lines[NONE])
+    twist_rates(scene, rules)
+    actuation_loads(scene, tubes, segments, rules, state[S_TWISTS] == TWISTED, bench.rates, out)
+    twist = 0.0
+    for u in range(scene.counts[N_UNKNOWNS]):
+        twist += 0.5 * scene.vectors[Y, u] * scene.vectors[Y, u]
+    out[4, 0] += twist + out[5, 0]
+    return OK
+
+
+@entry_point(f"int64({WORKSPACE}, float64[::1], float64, float64[:, ::1], float64[:, ::1])")
+def jacobian(
+    tubes: Array, segments: Ints, rules: Array, floats: Array, ints: Ints, state: Array, tolerance: float, out: Array,
+    gain: Array,
+) -> int:  # fmt: skip
+    """Rates of the tip of ``state`` with alpha and D into out (2 N, 6), position [m] and rotation [rad] in base axes,
+    and of the turn at each tube's own end with alpha into gain (N, N).  NOT_PROVEN where the state is not stable."""
+    kit = Kit(tubes, segments, rules, floats, ints)
+    N = len(segments)
+    which = open_state(kit, state, tolerance)
+    if which < 0:
+        return TOO_SMALL
+    scene, bench = scene_of(kit, which), bench_of(kit)
+    alpha = state[STATE : STATE + N]
+    energy_gradient(scene, rules, alpha)
+    twists = state[S_TWISTS] != RIGID
+    if twists and not factorize(scene, bench, rules, 1, EXACT, 0.0, 0.0, -1.0):
+        return NOT_PROVEN
+    for j in range(N):
+        bench.lines[TURNED_BY, j] = scene.held[TORQUE, 0, j] if twists else 0.0
+    bend(scene, rules, alpha)
+    chain(scene, tubes, rules)
+    M = scene.counts[N_ELEMENTS]
+    alpha_rate, D_rate = bench.lines[ALPHA_RATE], bench.lines[D_RATE]
+    ends, explicit, answered = bench.ends, bench.moved[EXPLICIT], bench.moved[ANSWERED]
+    for p in range(2 * N):
+        for j in range(N):
+            alpha_rate[j] = 1.0 if p == j else 0.0
+            D_rate[j] = 1.0 if p == N + j else 0.0
+        answer_rates(
+            scene, bench, tubes, segments, rules, alpha_rate, D_rate, bench.lines[TURNED_BY], ends, explicit, twists
+        )
+        answered_ends(scene, answered)
+        tip_rates(scene, bench, tubes, rules, scene.counts[LEADER], D_rate, ends, explicit, answered, out[p])
+        if p < N:
+            for j in range(N):
+                gain[j, p] = explicit[M, j] + answered[M, j]
+    return OK
+
+
+@entry_point(f"int64({WORKSPACE}, float64[::1], float64, int64, float64[::1], float64[:, ::1], float64[:, ::1])")
+def backbone(
+    tubes: Array, segments: Ints, rules: Array, floats: Array, ints: Ints, state: Array, tolerance: float, tube: int,
+    s: Array, position: Array, orientation: Array,
+) -> int:  # fmt: skip
+    """Poses of a tube's material, the leader's if ``tube`` < 0, at increasing arc lengths s (n,) [m]: position (n, 3)
+    [m] and unit quaternions x, y, z, w (n, 4)."""
+    kit = Kit(tubes, segments, rules, floats, ints)
+    N = len(segments)
+    which = open_state(kit, state, tolerance)
+    if which < 0:
+        return TOO_SMALL
+    scene, bench = scene_of(kit, which), bench_of(kit)
+    spread_angles(scene, state[STATE : STATE + N], scene.vectors[Y])
+    if not is_framed(scene):
+        bend(scene, rules, bench.lines[NONE])
+        chain(scene, tubes, rules)
+    trace(scene, bench, tubes, rules, scene.counts[LEADER] if tube < 0 else tube, s, position, orientation)
+    return OK
+
+
+@entry_point(f"int64({WORKSPACE}, float64[::1], float64, float64[::1], float64[:, ::1], float64[:, ::1])")
+def angles(
+    tubes: Array, segments: Ints, rules: Array, floats: Array, ints: Ints, state: Array, tolerance: float, s: Array,
+    psi: Array, torque: Array,
+) -> int:  # fmt: skip
+    """psi (n, N) [rad] and torques (n, N) [N m] of all tubes at arc lengths s (n,) [m]; before the orifice, at s < 0,
+    those in the guide."""
+    kit = Kit(tubes, segments, rules, floats, ints)
+    N = len(segments)
+    which = open_state(kit, state, tolerance)
+    if which < 0:
+        return TOO_SMALL
+    scene = scene_of(kit, which)
+    spread_angles(scene, state[STATE : STATE + N], scene.vectors[Y])
+    for g in range(len(s)):
+        for j in range(N):
+            psi[g, j] = angle_at(scene, s[g], j) if s[g] > 0.0 else scene.held[ANGLE, 0, j]
+            torque[g, j] = torque_at(scene, s[g], j) if s[g] >= 0.0 else guide_torque(scene, j)
+    return OK
+
+
+@entry_point(f"int64({WORKSPACE}, float64[::1], float64, float64[:, ::1])")
+def elements(
+    tubes: Array, segments: Ints, rules: Array, floats: Array, ints: Ints, state: Array, tolerance: float, out: Array
+) -> int:
+    """Start and end [m] of the elements of ``state``, 1 where tubes are coupled, and the degree there, into out (E, 4);
+    how many there are, -1 if the workspace is too small."""
+    kit = Kit(tubes, segments, rules, floats, ints)
+    which = open_state(kit, state, tolerance)
+    if which < 0:
+        return -1
+    scene = scene_of(kit, which)
+    M = scene.counts[N_ELEMENTS]
+    for m in range(min(M, len(out))):
+        out[m, 0], out[m, 1] = scene.line[m, ARC], scene.line[m + 1, ARC]
+        out[m, 2], out[m, 3] = scene.marks[m, COUPLED], scene.marks[m, DEGREE]
+    return M
+
+
+@entry_point(f"int64({WORKSPACE}, float64[::1], float64, float64[::1])")
+def describe(
+    tubes: Array, segments: Ints, rules: Array, floats: Array, ints: Ints, state: Array, tolerance: float, out: Array
+) -> int:
+    """``state``, stable or not, with its torques, residual and tip, into ``out``; its estimate is NaN."""
+    kit = Kit(tubes, segments, rules, floats, ints)
+    N = len(segments)
+    which = open_state(kit, state, tolerance)
+    if which < 0:
+        return TOO_SMALL
+    scene = scene_of(kit, which)
+    alpha = state[STATE : STATE + N]
+    energy_gradient(scene, rules, alpha)
+    if not write_state(scene, alpha, int(state[S_STEPS]), TWISTED, out):
+        return TOO_SMALL
+    bend(scene, rules, alpha)
+    put_tip(scene, tubes, rules, out)
+    out[S_ESTIMATE] = math.nan
+    return OK
+
+
+@entry_point(
+    f"int64({WORKSPACE}, float64[::1], float64, float64[:, ::1], complex128[:, ::1], float64[::1], float64[::1])"
+)
+def dense_map(
+    tubes: Array, segments: Ints, rules: Array, floats: Array, ints: Ints, state: Array, tolerance: float, out: Array,
+    moment: Complex, share: Array, place: Array,
+) -> int:  # fmt: skip
+    """For who wants whole matrices: psi at the Gauss points of the coupled elements is alpha plus ``out`` (G N, U)
+    times the unknowns; moment (G, N) K kappa* [N m], share (G,) weight over sum of K [1/(N m)], place (G,)
+    their arc lengths [m].  How many Gauss points, -1 if the
+    workspace is too small; arrays that are too short are not filled."""
+    kit = Kit(tubes, segments, rules, floats, ints)
+    N = len(segments)
+    which = open_state(kit, state, tolerance)
+    if which < 0:
+        return -1
+    scene = scene_of(kit, which)
+    count = 0
+    for m in range(scene.counts[N_ELEMENTS]):
+        count += scene.marks[m, GAUSS] if scene.marks[m, COUPLED] else 0
+    if len(share) < count or out.shape[1] < scene.counts[N_UNKNOWNS]:
+        return count
+    row = 0
+    for m in range(scene.counts[N_ELEMENTS]):
+        G = scene.marks[m, GAUSS]
+        for g in range(G if scene.marks[m, COUPLED] else 0):
+            place[row] = scene.gauss[scene.marks[m, ROW] + g, PLACE]
+            share[row] = scene.gauss[scene.marks[m, ROW] + g, WEIGHT] / scene.line[m, STIFFNESS]
+            for j in range(N):
+                moment[row, j] = scene.moments[REST, scene.marks[m, ROW] + g, j]
+                line = out[row * N + j]
+                for u in range(len(line)):
+                    line[u] = 0.0
+                line[j] = scene.base[ROOT, j]
+                for before in range(m):
+                    if scene.parts[SIZE, before, j] > 0:
+                        line[scene.parts[FIRST, before, j]] += scene.held[SCALE, before, j]
+                for k in range(scene.parts[SIZE, m, j]):
+                    line[scene.parts[FIRST, m, j] + k] += scene.held[SCALE, m, j] * rules[G, g, INTEGRAL + k]
+            row += 1
+    return count

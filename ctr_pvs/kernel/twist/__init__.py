@@ -1,0 +1,1 @@
+"""Twist, element by element: energy, Newton by condensation, margin, relaxed state, gradient flow."""

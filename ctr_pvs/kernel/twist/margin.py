@@ -1,0 +1,126 @@
+"""The stability margin: the smallest eigenvalue of the energy's Hessian, relative to torsional stiffness.
+
+The unknowns are scaled so that torsion alone has the unit matrix, hence this is an ordinary eigenvalue; bending is
+eliminated, the guide counted.  1: nothing pulls the tubes off; 0: a fold.  A twist field outside the basis has 1.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ctr_pvs.kernel.arrays import COUPLED
+from ctr_pvs.kernel.arrays import GAUSS
+from ctr_pvs.kernel.arrays import N_ELEMENTS
+from ctr_pvs.kernel.arrays import N_UNKNOWNS
+from ctr_pvs.kernel.arrays import NONE
+from ctr_pvs.kernel.arrays import ROW
+from ctr_pvs.kernel.arrays import ROWS
+from ctr_pvs.kernel.arrays import STEP
+from ctr_pvs.kernel.arrays import TURNED
+from ctr_pvs.kernel.arrays import Array
+from ctr_pvs.kernel.arrays import Bench
+from ctr_pvs.kernel.arrays import Scene
+from ctr_pvs.kernel.compiler import compiled
+from ctr_pvs.kernel.twist.condensation import factorize
+from ctr_pvs.kernel.twist.condensation import substitute
+from ctr_pvs.kernel.twist.element import EXACT
+from ctr_pvs.kernel.twist.element import energy_gradient
+
+#: Most Lanczos vectors, and the relative change of the largest Ritz value that ends it.
+MOST_VECTORS, SETTLED = ROWS - 2, 1e-13
+#: Below this a new vector is rounding: the space is exhausted.
+BREAKDOWN = 1e-12
+
+
+@compiled
+def all_attract(scene: Scene) -> bool:
+    """True if no two tubes push each other anywhere: then the margin is 1 without a look at the Hessian."""
+    N = scene.base.shape[1]
+    for m in range(scene.counts[N_ELEMENTS]):
+        if not scene.marks[m, COUPLED]:
+            continue
+        for row in range(scene.marks[m, ROW], scene.marks[m, ROW] + scene.marks[m, GAUSS]):
+            for i in range(N):
+                for j in range(i):
+                    if (scene.moments[TURNED, row, i].conjugate() * scene.moments[TURNED, row, j]).real < 0.0:
+                        return False
+    return True
+
+
+@compiled
+def stability_margin(scene: Scene, bench: Bench, rules: Array, alpha: Array) -> float:
+    """The margin of ``y`` at alpha (N,) [rad] and the finer degree, clipped at 1; -1 if it is not positive.
+
+    By Lanczos on the inverse of the Hessian, from a fixed start.
+    """
+    energy_gradient(scene, rules, alpha)
+    if all_attract(scene):
+        return 1.0
+    if not factorize(scene, bench, rules, 1, EXACT, 0.0, 0.0, -1.0):
+        return -1.0
+    U = scene.counts[N_UNKNOWNS]
+    vectors = bench.rows
+    v = vectors[0]
+    size = 0.0
+    for u in range(U):
+        v[u] = 1.0 + 0.5 * math.sin(1.7 * u)  # a mixed start: no symmetry of a robot is orthogonal to it
+        size += v[u] * v[u]
+    for u in range(U):
+        v[u] /= math.sqrt(size)
+    diagonal, side = vectors[MOST_VECTORS], vectors[MOST_VECTORS + 1]
+    largest, count = 0.0, 0
+    for k in range(min(MOST_VECTORS, U)):
+        w = scene.vectors[STEP]
+        substitute(scene, bench, 1, vectors[k], bench.lines[NONE], w, False)
+        dot = 0.0
+        for u in range(U):
+            dot += vectors[k, u] * w[u]
+        diagonal[k] = dot
+        count = k + 1
+        for _ in range(2):  # full orthogonalisation, twice: few vectors, no ghosts
+            for i in range(k + 1):
+                dot = 0.0
+                for u in range(U):
+                    dot += vectors[i, u] * w[u]
+                for u in range(U):
+                    w[u] -= dot * vectors[i, u]
+        size = 0.0
+        for u in range(U):
+            size += w[u] * w[u]
+        size = math.sqrt(size)
+        previous = largest
+        largest = largest_eigenvalue(diagonal, side, count)
+        if size < BREAKDOWN * largest or largest - previous <= SETTLED * largest:
+            break
+        if k + 1 < min(MOST_VECTORS, U):
+            side[k] = size
+            for u in range(U):
+                vectors[k + 1, u] = w[u] / size
+    return min(1.0, 1.0 / largest)
+
+
+@compiled
+def largest_eigenvalue(diagonal: Array, side: Array, n: int) -> float:
+    """Of the symmetric tridiagonal matrix with ``diagonal`` (n,) and ``side`` (n - 1,), by bisection on its inertia."""
+    low, high = -math.inf, -math.inf
+    for i in range(n):
+        left = abs(side[i - 1]) if i > 0 else 0.0
+        right = abs(side[i]) if i < n - 1 else 0.0
+        low, high = max(low, diagonal[i]), max(high, diagonal[i] + left + right)
+    while high - low > 4e-16 * max(abs(low), abs(high)):
+        middle = 0.5 * (low + high)
+        if middle <= low or middle >= high:
+            break
+        below, pivot = 0, 1.0
+        for i in range(n):
+            step = side[i - 1] * side[i - 1] / pivot if i > 0 else 0.0
+            pivot = middle - diagonal[i] - step
+            if pivot == 0.0:
+                pivot = 1e-300
+            if pivot > 0.0:
+                below += 1
+        if below == n:
+            high = middle
+        else:
+            low = middle
+    return high

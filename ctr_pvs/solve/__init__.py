@@ -1,0 +1,1 @@
+"""From a command to an equilibrium: relaxed start, one proven step, path, snap, all equilibria, batches."""
