@@ -29,15 +29,15 @@ soak: setup ## the long tests; SOAK_MINUTES=1 shortens the longest of them, 10 m
 	@$(IN_ENV) python3 -m pytest -m soak
 
 bench: setup ## speed against accuracy, measured here and charted: docs/speed_accuracy.*, docs/cost_growth.*
-	@$(IN_ENV) python3 bench/speed_accuracy.py
-	@$(IN_ENV) python3 bench/cost_growth.py
-	@$(IN_ENV) python3 bench/serving_cost.py
-	@$(IN_ENV) python3 bench/numba_kernel.py
-	@$(IN_ENV) python3 bench/effectivity.py
-	@$(IN_ENV) python3 bench/node_latency.py
+	@$(IN_ENV) python3 -m bench.speed.speed_accuracy
+	@$(IN_ENV) python3 -m bench.growth.cost_growth
+	@$(IN_ENV) python3 -m bench.serving.serving_cost
+	@$(IN_ENV) python3 -m bench.serving.hard_cases
+	@$(IN_ENV) python3 -m bench.accuracy.effectivity
+	@$(IN_ENV) python3 -m bench.node.node_latency
 
 clean: ## remove everything that make has made, compiled kernels in the user's cache among it
 	@.venv/bin/python3 -m ctr_pvs.kernel --remove 2>/dev/null | sed 's/^/rm -rf /' || true
 	rm -rf .venv .ws demo .mypy_cache .pytest_cache .ruff_cache
-	find ctr_pvs ctr_pvs_ros test -name __pycache__ -prune -exec rm -rf {} +
+	find bench ctr_pvs ctr_pvs_ros test -name __pycache__ -prune -exec rm -rf {} +
 	@echo "the next make sets up anew and compiles the kernels again, which takes some minutes"

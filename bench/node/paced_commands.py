@@ -1,0 +1,131 @@
+"""A controller at a steady pace: commands go out serialized, answers are kept as they come in."""
+
+from __future__ import annotations
+
+import math
+import struct
+import time
+from collections import defaultdict
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from geometry_msgs.msg import PoseArray
+from geometry_msgs.msg import PoseStamped
+from numpy.typing import NDArray
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.serialization import serialize_message
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64
+
+from bench.node.timed_node import new_executor
+
+JOINTS = ["outer_rotation", "outer_translation", "inner_rotation", "inner_translation"]
+STAMPED = {"setpoint_js": JointState, "setpoint_cp": PoseStamped, "backbone": PoseArray}
+#: Commands go back and forth between these angles of the inner tube [deg] in steps of 0.1 deg, partial overlap.
+LOW, HIGH, STEP = 100.0, 110.0, 0.1
+D = (0.0935, 0.1705)
+#: What the tubes slide out with each step where they slide at all [m].
+SLIDE = (3e-5, 1e-4)
+#: Offset of the stamp in a serialized message that begins with a header.
+STAMP = struct.Struct("<4xi")
+TIMEOUT = 20.0  # s
+SETTLE = 0.5  # s, before and after a run
+#: s; in the first seconds after a process has joined, Fast DDS looks at its port in shared memory, and now and then
+#: that holds up a publisher for a third of a second (its issue 6535).
+JOINING = 4.0
+
+
+@dataclass(frozen=True)
+class Run:
+    """What came back: the fraction of commands answered, and the age of each complete answer [s], from the command to
+    the arrival of the last of its messages."""
+
+    rate: float
+    answered: float
+    ages: NDArray[np.float64]
+
+    def age(self, percent: float) -> float:
+        """Percentile of the ages, us."""
+        return 1e6 * float(np.percentile(self.ages, percent)) if len(self.ages) else float("nan")
+
+
+def command(number: int, sliding: bool) -> bytes:
+    """Serialized command; its stamp is ``number`` seconds."""
+    steps = round((HIGH - LOW) / STEP)
+    step = abs(number % (2 * steps) - steps)
+    outer, inner = (place + sliding * step * slide for place, slide in zip(D, SLIDE, strict=True))
+    message = JointState(name=JOINTS, position=[0.0, outer, math.radians(LOW + STEP * step), inner])
+    message.header.stamp.sec = number
+    return serialize_message(message)
+
+
+class PacedClient:
+    """Sends through ``node`` and listens with raw subscribers, so that decoding is not what is measured.
+
+    sliding : whether commands also move the tubes' bases.
+    """
+
+    def __init__(self, node: Node, sliding: bool = False) -> None:
+        self._sliding = sliding
+        self._arrivals: dict[int, list[float]] = defaultdict(list)
+        self._margins = 0
+        every = QoSProfile(depth=100)
+        for topic, kind in STAMPED.items():
+            node.create_subscription(kind, topic, self._keep, every, raw=True)
+        node.create_subscription(Float64, "stability_margin", self._count, every, raw=True)
+        self._publisher = node.create_publisher(JointState, "servo_jp", 1)
+        self._executor = new_executor("events")
+        self._executor.add_node(node)
+        self._next = 1
+
+    def _keep(self, message: bytes) -> None:
+        self._arrivals[STAMP.unpack_from(message)[0]].append(time.perf_counter())
+
+    def _count(self, message: bytes) -> None:
+        self._margins += 1
+
+    def spin_until(self, done: Callable[[], bool], timeout: float = TIMEOUT) -> None:
+        """Handle messages until ``done``; raises TimeoutError after ``timeout`` [s]."""
+        end = time.monotonic() + timeout
+        while not done():
+            if time.monotonic() > end:
+                raise TimeoutError("no answer from the node")
+            self._executor.spin_once(timeout_sec=0.02)
+
+    def spin_for(self, seconds: float) -> None:
+        """Handle messages for a while."""
+        end = time.monotonic() + seconds
+        self.spin_until(lambda: time.monotonic() > end, seconds + 1.0)
+
+    def connect(self) -> None:
+        """Wait for the node, and for the answer to a first command."""
+        self.spin_until(lambda: self._publisher.get_subscription_count() > 0)
+        self.spin_for(SETTLE)
+        self._publisher.publish(command(self._number(), self._sliding))
+        self.spin_until(lambda: any(len(arrivals) == len(STAMPED) for arrivals in self._arrivals.values()))
+        self.spin_for(JOINING)
+
+    def _number(self) -> int:
+        self._next += 1
+        return self._next - 1
+
+    def run(self, rate: float, count: int) -> Run:
+        """``count`` commands, ``rate`` a second. A command that is late is not made up for by a hurried one."""
+        numbers = [self._number() for _ in range(count)]
+        messages = [command(number, self._sliding) for number in numbers]
+        self.spin_for(SETTLE)
+        margins = self._margins
+        sent = {}
+        due = time.perf_counter()
+        for number, message in zip(numbers, messages, strict=True):
+            while (left := due - time.perf_counter()) > 0.0:
+                self._executor.spin_once(timeout_sec=left)
+            due = max(due, time.perf_counter() - 0.5 / rate) + 1.0 / rate
+            sent[number] = time.perf_counter()
+            self._publisher.publish(message)
+        self.spin_for(SETTLE)
+        complete = {number: self._arrivals[number] for number in numbers if len(self._arrivals[number]) == len(STAMPED)}
+        ages = np.array([max(arrivals) - sent[number] for number, arrivals in complete.items()])
+        return Run(rate, min(len(complete), self._margins - margins) / count, ages)

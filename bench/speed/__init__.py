@@ -1,0 +1,1 @@
+"""Speed against accuracy, beside other ways to the same tip."""

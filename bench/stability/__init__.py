@@ -1,0 +1,1 @@
+"""Stability: what is found, what it costs, and where methods fail."""
