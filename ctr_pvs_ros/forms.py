@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import struct
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from geometry_msgs.msg import Pose
@@ -16,12 +17,14 @@ from std_msgs.msg import Float64
 from std_msgs.msg import Header
 
 from ctr_pvs import Backbone
-from ctr_pvs import Equilibrium
 from ctr_pvs_ros.commands import joint_positions
 from ctr_pvs_ros.messages import pose_of
 from ctr_pvs_ros.serialized import STAMP
 from ctr_pvs_ros.serialized import Form
 from ctr_pvs_ros.serialized import placeholders
+
+if TYPE_CHECKING:
+    from ctr_pvs import Equilibrium
 
 PER_POSE = 7  # position and quaternion
 

@@ -7,6 +7,7 @@ flicker, and its facets show how a tube is rolled.
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from builtin_interfaces.msg import Time
@@ -18,11 +19,13 @@ from visualization_msgs.msg import Marker
 from visualization_msgs.msg import MarkerArray
 
 from ctr_pvs import Backbone
-from ctr_pvs import Equilibrium
 from ctr_pvs import Robot
 from ctr_pvs_ros.serialized import STAMP
 from ctr_pvs_ros.serialized import Form
 from ctr_pvs_ros.serialized import placeholders
+
+if TYPE_CHECKING:
+    from ctr_pvs import Equilibrium
 
 NAMESPACE = "tubes"
 RINGS, SIDES = 32, 8

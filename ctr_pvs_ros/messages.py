@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from geometry_msgs.msg import Point
 from geometry_msgs.msg import Pose
@@ -16,8 +18,10 @@ from std_msgs.msg import Header
 from std_msgs.msg import MultiArrayDimension
 
 from ctr_pvs import Backbone
-from ctr_pvs import Equilibrium
 from ctr_pvs_ros.commands import joint_positions
+
+if TYPE_CHECKING:
+    from ctr_pvs import Equilibrium
 
 
 def receipt_header(header: Header, clock: Clock, frame_id: str) -> Header:

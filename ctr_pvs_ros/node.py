@@ -1,12 +1,18 @@
-"""The node ctr_equilibrium: commands in on servo_jp, equilibria out; a service beside it."""
+"""The node ctr_equilibrium: commands in on servo_jp, equilibria out; a service beside it.
+
+What solves is imported when the first solver is made, after the robot file and the commands in parameters have been
+found right: it brings the compiler along, which takes longer than all the rest of a start.
+"""
 
 from __future__ import annotations
 
 import gc
 import signal
+import threading
 import time
 import traceback
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 from typing import Any
 
 import rclpy
@@ -33,7 +39,7 @@ from std_msgs.msg import Float64MultiArray
 from std_msgs.msg import Header
 from visualization_msgs.msg import MarkerArray
 
-from ctr_pvs import EquilibriumSolver
+import ctr_pvs
 from ctr_pvs import load_robot
 from ctr_pvs_ros import messages
 from ctr_pvs_ros import parameters
@@ -56,6 +62,10 @@ from ctr_pvs_ros.service_process import ServiceProcess
 from ctr_pvs_ros.stream import Policy
 from ctr_pvs_ros.stream import Stream
 
+if TYPE_CHECKING:
+    from ctr_pvs import EquilibriumSolver
+    from ctr_pvs.kernel.compiler import Background
+
 NODE_NAME = "ctr_equilibrium"
 EXIT_BAD_INPUT = 2
 # What a wrong parameter, robot file, or ROS argument (rclpy's RCLError is a RuntimeError) ends in.
@@ -64,6 +74,7 @@ LOG_PERIOD = 2.0  # s; at most one line of a kind in this time
 WAKE_PERIOD = 0.1  # s; a signal is seen at the latest after this time
 CATCH_UP_PERIOD = 0.05  # s; late joiners wait no longer, and markers move no faster
 LAST_WORD = Duration(seconds=0.2)  # for viewers to hear that the tubes are gone
+LOADING_TIME = 1.0  # s; kernels that are being loaded when the node ends are waited for so long
 
 NEWEST_WINS = QoSProfile(depth=1)
 LATE_JOINERS_SEE_THE_LAST = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -78,6 +89,7 @@ class EquilibriumNode(Node):
     Attributes:
         interrupted: whether a signal asks it to end; who spins it should stop.
         solving: whether a solve of the stream is under way.
+        compiling: the process that compiles the kernels, if that is still to be done.
 
     Raises:
         ParameterException, RuntimeError, ValueError: its parameters, its middleware or its robot file do not allow it;
@@ -91,9 +103,9 @@ class EquilibriumNode(Node):
         self._settings = parameters.read(self)
         self._robot = load_robot(self._settings.robot_file)
         self._reader = self._new_reader(self._settings)
+        initial = self._initial_command()
         self._stream = Stream(self._new_solver())
         self._report = Report()
-        initial = self._initial_command()
 
         self._outputs = self._new_outputs()
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 1)
@@ -108,18 +120,38 @@ class EquilibriumNode(Node):
         self.create_timer(1.0, self._guarded(self._look_round), clock=steady)
         self.add_on_set_parameters_callback(self._on_set_parameters)
         self.add_post_set_parameters_callback(self._after_set_parameters)
+        self.compiling = self._compile()
         self.get_logger().info(f"serving robot {self._robot.name!r} from {self._settings.robot_file}")
 
     def destroy_node(self) -> None:
-        """Also takes the markers away and ends the service's process."""
+        """Also takes the markers away, and ends the processes of the service and the compiler."""
+        stopping = threading.Thread(target=self.compiling.stop)  # which takes its time, as do the others
+        stopping.start()
         self._outputs.clear()
         self._markers.wait_for_all_acked(LAST_WORD)
         self._service.stop()
+        stopping.join()
+        self.compiling.wait(LOADING_TIME)
         super().destroy_node()
+
+    def _compile(self) -> Background:
+        """See to it that the kernels run compiled, now or later; say so if it is later, or never."""
+        from ctr_pvs.kernel import compiler
+
+        compiling = compiler.compile_in_background(self._on_compiled)
+        if compiler.mode() == "interpreted":
+            meanwhile = " (under way, beside the node)" if compiling.running else ""
+            self.get_logger().warning(f"{compiler.why()}{meanwhile}")
+        return compiling
+
+    def _on_compiled(self, outcome: str) -> None:
+        """In a thread of its own, once it is known whether kernels run compiled from now on."""
+        self._service.update(self._settings)  # which is when the service's process looks for them, too
+        self.get_logger().info(outcome)
 
     def _new_solver(self) -> EquilibriumSolver:
         settings = self._settings
-        return EquilibriumSolver(
+        return ctr_pvs.EquilibriumSolver(
             self._robot, tolerance=settings.tolerance, fidelity=settings.fidelity, force_model=settings.force_model
         )
 

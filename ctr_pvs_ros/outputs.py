@@ -10,11 +10,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 from typing import Any
 from typing import Protocol
 
 from ctr_pvs import Backbone
-from ctr_pvs import Equilibrium
+
+if TYPE_CHECKING:
+    from ctr_pvs import Equilibrium
 
 
 class Publisher(Protocol):

@@ -60,11 +60,17 @@ PARAMETERS: dict[str, ParameterRule] = {
     "tolerance": ParameterRule(
         1e-5, "Largest estimated tip error of an answer [m].", bounds=(1e-10, 1.0), read_only=True
     ),
-    # Which levels and force models there are is the solver's to say.
-    "fidelity": ParameterRule("auto", "Model level; auto picks the smallest that meets the tolerance.", read_only=True),
+    # The solver knows these levels and force models. It is not asked: importing it takes longer than a refusal may.
+    "fidelity": ParameterRule(
+        "auto",
+        "Model level; auto picks the smallest that meets the tolerance.",
+        choices=("auto", "torsionless", "torsion", "full"),
+        read_only=True,
+    ),
     "force_model": ParameterRule(
         "virtual_work",
         "How insertion forces are computed; virtual_work: derivative of the elastic energy.",
+        choices=("virtual_work", "renda2021"),
         read_only=True,
     ),
     "initial_command": ParameterRule(

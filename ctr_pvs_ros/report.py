@@ -5,16 +5,19 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections import deque
+from typing import TYPE_CHECKING
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from diagnostic_msgs.msg import KeyValue
 
-from ctr_pvs import Equilibrium
 from ctr_pvs import Status
 from ctr_pvs_ros.commands import Command
 from ctr_pvs_ros.commands import RejectedCommand
 from ctr_pvs_ros.stream import Answer
+
+if TYPE_CHECKING:
+    from ctr_pvs import Equilibrium
 
 SOLVE_TIMES_KEPT = 1000
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from geometry_msgs.msg import PoseStamped
 from std_msgs.msg import Header
 
-from ctr_pvs import Equilibrium
-from ctr_pvs import EquilibriumSolver
+from ctr_pvs import Backbone
+from ctr_pvs import Pose
 from ctr_pvs import Status
 from ctr_pvs_interfaces.srv import SolveEquilibrium
 from ctr_pvs_ros import messages
@@ -18,6 +20,10 @@ from ctr_pvs_ros.commands import RejectedCommand
 from ctr_pvs_ros.parameters import MAX_BACKBONE_POSES
 from ctr_pvs_ros.turns import Late
 from ctr_pvs_ros.turns import Turns
+
+if TYPE_CHECKING:
+    from ctr_pvs import Equilibrium
+    from ctr_pvs import EquilibriumSolver
 
 BAD_INPUT = "bad_input"
 
@@ -55,24 +61,65 @@ class SolveService:
             return _failed(response, BAD_INPUT, rule)
         start = "warm" if request.warm_start else "cold"
         try:
-            solved = self._turns.take(lambda left: self._solve(command, start, left), budget)
+            solved = self._turns.take(lambda left: self._solve(command, start, poses, left), budget)
         except Late as late:
             return _failed(response, Status.TIMEOUT.value, str(late))
         except Exception as error:  # whatever went wrong, the client gets an answer
             return _failed(response, Status.NOT_CONVERGED.value, f"internal error: {type(error).__name__}: {error}")
-        equilibrium, response.solve_time = solved
-        response.success = equilibrium.success
-        response.status = equilibrium.status.value
-        response.message = equilibrium.message
-        if equilibrium.success:
-            _fill_answer(response, equilibrium, header, poses)
+        response.success = solved.success
+        response.status = solved.status.value
+        response.message = solved.message
+        response.solve_time = solved.time
+        if solved.numbers is not None:
+            _fill_answer(response, solved.numbers, header)
         return response
 
-    def _solve(self, command: Command, start: str, budget: float) -> tuple[Equilibrium, float]:
-        """The equilibrium, and the wall-clock time it took [s]."""
+    def _solve(self, command: Command, start: str, poses: int, budget: float) -> _Solved:
         began = time.perf_counter()
         equilibrium = self._solver.solve(command.alpha, command.D, start=start, budget=budget)
-        return equilibrium, time.perf_counter() - began
+        took = time.perf_counter() - began
+        numbers = _numbers_of(equilibrium, poses) if equilibrium.success else None
+        return _Solved(equilibrium.success, equilibrium.status, equilibrium.message, took, numbers)
+
+
+@dataclass(frozen=True)
+class _Numbers:
+    """All of an equilibrium that is told. It is computed in turn: one thread at a time may use a solver."""
+
+    tip: Pose
+    backbone: Backbone
+    arrays: dict[str, list[float]]
+    scalars: dict[str, float | int | str]
+
+
+@dataclass(frozen=True)
+class _Solved:
+    """What came of a solve, and the wall-clock time it took [s]."""
+
+    success: bool
+    status: Status
+    message: str
+    time: float
+    numbers: _Numbers | None
+
+
+def _numbers_of(equilibrium: Equilibrium, poses: int) -> _Numbers:
+    lower, upper = equilibrium.force_interval.T
+    arrays = {"torque": equilibrium.torque, "force": equilibrium.force, "force_lower": lower, "force_upper": upper}
+    return _Numbers(
+        equilibrium.tip,
+        equilibrium.backbone(poses),
+        {name: array.tolist() for name, array in arrays.items()},
+        {
+            "stability_margin": float(equilibrium.stability_margin),
+            "fidelity": equilibrium.fidelity,
+            "degrees_of_freedom": int(equilibrium.degrees_of_freedom),
+            "error_estimate": float(equilibrium.error_estimate),
+            "residual": float(equilibrium.residual),
+            "iterations": int(equilibrium.iterations),
+            "energy": float(equilibrium.energy),
+        },
+    )
 
 
 def _failed(response: SolveEquilibrium.Response, status: str, message: str) -> SolveEquilibrium.Response:
@@ -96,19 +143,10 @@ def _fill_failure(response: SolveEquilibrium.Response, header: Header) -> None:
     response.energy = nan
 
 
-def _fill_answer(response: SolveEquilibrium.Response, equilibrium: Equilibrium, header: Header, poses: int) -> None:
-    backbone = equilibrium.backbone(poses)
-    response.tip = messages.tip_of(equilibrium, header)
-    response.backbone = messages.backbone_of(backbone, header)
-    response.backbone_s = backbone.s.tolist()
-    response.torque = equilibrium.torque.tolist()
-    response.force = equilibrium.force.tolist()
-    response.force_lower = equilibrium.force_interval[:, 0].tolist()
-    response.force_upper = equilibrium.force_interval[:, 1].tolist()
-    response.stability_margin = float(equilibrium.stability_margin)
-    response.fidelity = equilibrium.fidelity
-    response.degrees_of_freedom = int(equilibrium.degrees_of_freedom)
-    response.error_estimate = float(equilibrium.error_estimate)
-    response.residual = float(equilibrium.residual)
-    response.iterations = int(equilibrium.iterations)
-    response.energy = float(equilibrium.energy)
+def _fill_answer(response: SolveEquilibrium.Response, numbers: _Numbers, header: Header) -> None:
+    pose = messages.pose_of(numbers.tip.position, numbers.tip.orientation)
+    response.tip = PoseStamped(header=header, pose=pose)
+    response.backbone = messages.backbone_of(numbers.backbone, header)
+    response.backbone_s = numbers.backbone.s.tolist()
+    for name, value in (numbers.arrays | numbers.scalars).items():
+        setattr(response, name, value)

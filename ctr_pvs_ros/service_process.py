@@ -1,8 +1,11 @@
 """The service in a process of its own, so that no request, however slow, holds up the command stream.
 
-In one process the two would share one interpreter lock: beside a solve in another thread, one answer of the stream in a
-hundred comes tens of milliseconds late. The node starts this process and tells it its settings, one JSON line for each
-change; the end of that pipe is the end of the process, whatever became of the node.
+In one process the two would share one interpreter lock. Compiled kernels do without it, so a solve in another thread
+holds it for some microseconds between two calls only; but whoever gets it from there is woken on the processor of that
+thread, and may have to wait until its time slice is over. docs/node_latency.md has the figures.
+
+The node starts this process and tells it its settings, one JSON line for each change; the end of that pipe is the end
+of the process, whatever became of the node.
 """
 
 from __future__ import annotations
@@ -24,7 +27,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 
-from ctr_pvs import EquilibriumSolver
+import ctr_pvs
 from ctr_pvs import load_robot
 from ctr_pvs_interfaces.srv import SolveEquilibrium
 from ctr_pvs_ros.commands import CommandReader
@@ -114,7 +117,7 @@ class SolveNode(Node):
             parameter_overrides=[simulated],
         )
         self._robot = load_robot(settings.robot_file)
-        solver = EquilibriumSolver(
+        solver = ctr_pvs.EquilibriumSolver(
             self._robot, tolerance=settings.tolerance, fidelity=settings.fidelity, force_model=settings.force_model
         )
         self._service = SolveService(self._reader(settings), solver)
@@ -148,9 +151,14 @@ def _settings_from(line: bytes) -> Settings:
 
 
 def _listen(pipe: IO[bytes], node: SolveNode, ended: threading.Event) -> None:
-    """Take over settings until the node's end of the pipe closes; then end, even in mid-solve."""
+    """Take over settings until the node's end of the pipe closes; then end, even in mid-solve.
+
+    The node also tells them again when it has compiled the kernels: they are looked for each time."""
+    from ctr_pvs.kernel import compiler  # not where the node imports this module: see there
+
     for line in pipe:
         node.update(_settings_from(line))
+        compiler.use_compiled()
     ended.set()
     threading.Timer(TIDY_TIME, os._exit, (0,)).start()
     rclpy.try_shutdown()

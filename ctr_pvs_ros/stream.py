@@ -5,13 +5,16 @@ from __future__ import annotations
 import copy
 import time
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from ctr_pvs import Equilibrium
-from ctr_pvs import EquilibriumSolver
 from ctr_pvs import Status
 from ctr_pvs_ros.commands import Command
 from ctr_pvs_ros.commands import Reason
 from ctr_pvs_ros.commands import RejectedCommand
+
+if TYPE_CHECKING:
+    from ctr_pvs import Equilibrium
+    from ctr_pvs import EquilibriumSolver
 
 
 @dataclass(frozen=True)
