@@ -1,5 +1,6 @@
 """Shapes of the paper's robot while its inner tube turns: the picture at the top of the README.
 
+pip install matplotlib
 python3 examples/shapes.py shapes.png
 """
 
