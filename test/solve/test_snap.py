@@ -16,9 +16,11 @@ from ctr_pvs import Segment
 from ctr_pvs import Status
 from ctr_pvs import Tube
 from ctr_pvs.answer.engine import Engine
+from ctr_pvs.answer.state import Snap
 from ctr_pvs.answer.state import State
 from ctr_pvs.oracles.two_tubes import TwoTubes
 from ctr_pvs.solve.dense import DenseEnergy
+from ctr_pvs.solve.path import joined
 
 FULL, PARTIAL = [0.0935, 0.2085], [0.0935, 0.1705]
 
@@ -384,3 +386,18 @@ def test_the_states_of_a_snap_tell_their_own_numbers(seed_robot):
         assert state.residual == pytest.approx(again.residual, abs=1e-9) and state.residual < 1e-9
         assert state.torque == pytest.approx(again.torque, abs=1e-9)
         assert state.solved_for == again.solved_for and state.coupled
+
+
+def snap_at(alpha, released):
+    turned = np.array([0.0, alpha])
+    return Snap(alpha, turned, np.zeros(2), "before", "after", released)
+
+
+def test_what_only_begins_a_snap_is_part_of_it():
+    """Faint releases of a drifting kink just before the snap that they lead to; others stay what they are."""
+    faint, other = [snap_at(6.0 + 1e-6 * index, 1e-10) for index in range(3)], snap_at(3.0, 1e-10)
+    last = snap_at(6.0 + 3e-6, 5.0)
+    first, whole = joined([other, *faint], last)
+    assert first is other
+    assert (whole.alpha[1], whole.t) == (6.0, 6.0) and whole.energy_released == pytest.approx(5.0 + 3e-10, rel=1e-15)
+    assert joined([snap_at(6.0, 1.0)], last)[0].energy_released == 1.0
