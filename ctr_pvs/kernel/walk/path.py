@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 
+from ctr_pvs.kernel.arrays import END
 from ctr_pvs.kernel.arrays import S_STEPS
 from ctr_pvs.kernel.arrays import STATE
 from ctr_pvs.kernel.arrays import Array
@@ -56,13 +57,12 @@ def command_at(begin: Array, end: Array, t: float, out: Array) -> None:
 
 @compiled
 def longest_step(tubes: Array, segments: Ints, begin: Array, end: Array) -> float:
-    """The longest step that may be worth a try, as a fraction of the path: of slides, and of turns between tubes."""
+    """The longest step that may be worth a try, as a fraction of the path, for how far tubes may slide in one."""
     N = len(segments)
-    longest, slide, low, high = 0.0, 0.0, math.inf, -math.inf
+    longest, slide = 0.0, 0.0
     for j in range(N):
-        longest = max(longest, tubes[j, segments[j] - 1, 1])
+        longest = max(longest, tubes[j, segments[j] - 1, END])
         slide = max(slide, abs(end[N + j] - begin[N + j]))
-        low, high = min(low, end[j] - begin[j]), max(high, end[j] - begin[j])
     return LARGEST_SLIDE * longest / max(slide, 1e-300)
 
 
