@@ -20,15 +20,6 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 
-#: An equilibrium is accepted when its residual twist [rad] is below this, plus rounding of large base angles.
-RESIDUAL_TWIST, ROUNDING = 1e-11, 64.0 * float(np.finfo(float).eps)
-
-
-def residual_limit(alpha: Array) -> float:
-    """Residual twist [rad] that counts as zero: cos and sin lose digits where base angles are many turns."""
-    return RESIDUAL_TWIST + ROUNDING * float(np.abs(alpha).max(initial=0.0))
-
-
 class DenseEnergy:
     """E(y; alpha) at base positions D (N,) [m] with polynomials of at least ``degree``, and two more.
 

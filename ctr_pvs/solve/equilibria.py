@@ -26,6 +26,7 @@ from ctr_pvs.answer.status import Status
 from ctr_pvs.errors import FieldError
 from ctr_pvs.kernel.arrays import S_ESTIMATE
 from ctr_pvs.kernel.arrays import S_STEPS
+from ctr_pvs.kernel.twist.newton import residual_limit
 from ctr_pvs.oracles.tip_curve import DEPTH
 from ctr_pvs.oracles.tip_curve import PairFold
 from ctr_pvs.oracles.tip_curve import TipCurve
@@ -34,7 +35,6 @@ from ctr_pvs.oracles.tube_pair import materials_at
 from ctr_pvs.oracles.tube_pair import tube_pair
 from ctr_pvs.robot.robot import Robot
 from ctr_pvs.solve.dense import DenseEnergy
-from ctr_pvs.solve.dense import residual_limit
 from ctr_pvs.solve.multistart import search
 
 Array = NDArray[np.float64]

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ctr_pvs.kernel.twist.newton import residual_limit
 from ctr_pvs.solve.dense import DenseEnergy
-from ctr_pvs.solve.dense import residual_limit
 
 Array = NDArray[np.float64]
 

@@ -88,11 +88,9 @@ def follow(
     """
     turn = float(np.ptp(path.alpha_rate))
     clock = np.array([begin, min(1.0, LARGEST_TURN / max(turn, 1e-300)), 0.0])
-    vector = start.vector
-    while True:
+    code, vector = MORE, start.vector
+    while code == MORE and time.monotonic() <= deadline:
         code, vector = engine.follow(path.begin, path.end, clock, degree, TRIES, vector)
-        if code != MORE or time.monotonic() > deadline:
-            break
     end = {FOLD: PathEnd.FOLD, MORE: PathEnd.TIMEOUT}.get(code, PathEnd.REACHED)
     return Followed(end, State(vector, engine.robot.n_tubes), float(clock[0]), (), int(clock[2]))
 

@@ -24,6 +24,7 @@ from ctr_pvs.kernel.walk.step import OK
 from ctr_pvs.pvs.printed_loads import check_renda2021
 from ctr_pvs.pvs.refine import refine_full
 from ctr_pvs.robot.robot import Robot
+from ctr_pvs.solve.batch import SEVERAL
 from ctr_pvs.solve.batch import Batch
 from ctr_pvs.solve.batch import Progress
 from ctr_pvs.solve.batch import solve_rows
@@ -41,8 +42,6 @@ MOST_REPEATS = 4
 
 FIDELITIES = ("auto", "torsionless", "torsion", "full")
 FORCE_MODELS = ("virtual_work", "renda2021")
-
-SEVERAL = "; several relaxed states are equally near, the path set out from one of them"
 
 
 class EquilibriumSolver:

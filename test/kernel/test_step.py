@@ -101,7 +101,7 @@ def test_level_and_degrees_have_no_history(seed_robot, tolerance):
 
 @pytest.mark.parametrize(
     ("tolerance", "levels", "fewest"),
-    [(1e-4, {"torsionless", "torsion"}, 2), (1e-5, {"torsion"}, 2), (1e-7, {"torsion"}, 3)],
+    [(1e-4, {"torsionless", "torsion"}, 3), (1e-5, {"torsion"}, 2), (1e-7, {"torsion"}, 3)],
 )
 def test_degree_changes_do_not_make_the_stream_jump(seed_robot, tolerance, levels, fewest):
     """Along a path on which level or degrees change, the answer stays within the tolerance of the exact one."""

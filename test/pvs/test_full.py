@@ -58,7 +58,7 @@ def scene(seed, tubes):
 
 def solved(robot, alpha, D, basis, nodes=12):
     energy = energy_of(robot, alpha, D, basis, nodes)
-    torsion = EquilibriumSolver(robot, tolerance=1e-10).solve(alpha, D)
+    torsion = EquilibriumSolver(robot, tolerance=1e-9).solve(alpha, D)
     assert torsion.success, torsion.message
     result = solve_full(energy, energy.project(torsion.shape))
     assert result.converged
