@@ -46,6 +46,11 @@ class CommandError(FieldError):
     """A command (alpha, D) that the robot cannot take. `field` is `alpha`, `D`, or one entry such as `D[1]`."""
 
 
+class LoadError(FieldError):
+    """An external load that cannot act on the robot. `field` is an argument of `Loads` or `PointForce`, or one entry
+    such as `point_forces[1].X`."""
+
+
 class RobotFileError(ValueError):
     """A robot file that cannot be read or breaks a rule.
 

@@ -7,7 +7,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from ctr_pvs.errors import RobotFileError
+from ctr_pvs.robot.cross_section import annulus_area
+from ctr_pvs.robot.cross_section import annulus_stiffness
+from ctr_pvs.robot.cross_section import shear_modulus_from_poisson
 from ctr_pvs.robot.file_table import Table
+from ctr_pvs.robot.robot import DENSITY_RANGE
 from ctr_pvs.robot.robot import DIAMETER_RANGE
 from ctr_pvs.robot.robot import LARGEST_CURVATURE
 from ctr_pvs.robot.robot import LARGEST_TURN
@@ -18,9 +22,7 @@ from ctr_pvs.robot.robot import Limits
 from ctr_pvs.robot.robot import Robot
 from ctr_pvs.robot.robot import Segment
 from ctr_pvs.robot.robot import Tube
-from ctr_pvs.robot.robot import annulus_stiffness
 from ctr_pvs.robot.robot import check_diameters
-from ctr_pvs.robot.robot import shear_modulus_from_poisson
 from ctr_pvs.robot.strict_yaml import read_yaml
 
 _MODULI = ("youngs_modulus", "shear_modulus", "poissons_ratio")
@@ -51,6 +53,7 @@ def load_robot(path: str | os.PathLike[str]) -> Robot:
             shear_modulus: 21.5e9    # Pa; or poissons_ratio
             inner_diameter: 2.01e-3  # m
             outer_diameter: 2.39e-3  # m
+            density: 6.45e3          # kg/m^3; optional, for the weight under gravity
             segments:                # from the base to the tip
               - {length: 93.5e-3}                       # m; straight
               - {length: 92.3e-3, curvature_y: [9.9]}   # polynomial in the segment's own abscissa, 1/m, 1/m^2, ...
@@ -59,8 +62,9 @@ def load_robot(path: str | os.PathLike[str]) -> Robot:
           D: {outer: [0.0, 0.15]}                       # m
 
     In place of the moduli, `bending_stiffness` and `torsional_stiffness` [N m^2] may be given; diameters then only
-    serve to check that tubes fit. A segment may give any of these keys again, for itself: for example the stiffnesses
-    of a patterned stretch. A helical segment has `curvature` [1/m] and `turn` [rad/m] in place of the polynomials.
+    serve to check that tubes fit, and for weight. A segment may give any of these keys again, for itself: for example
+    the stiffnesses of a patterned stretch. A helical segment has `curvature` [1/m] and `turn` [rad/m] in place of the
+    polynomials.
 
     Raises:
         RobotFileError: for anything that cannot be read or breaks a rule, naming file, key path, value and rule.
@@ -79,29 +83,34 @@ def load_robot(path: str | os.PathLike[str]) -> Robot:
 
 
 def _tube(table: Table) -> Tube:
-    table.refuse_other_keys(("name", "segments", *_MATERIAL))
+    table.refuse_other_keys(("name", "segments", "density", *_MATERIAL))
     name = table.require("name", "the tube's name")
     material = _material(table)
     stretches = []
     for entry in table.tables("segments", "segment"):
         entry.refuse_other_keys(("length", *_POLYNOMIAL, *_HELIX, *_MATERIAL))
         stretches.append((entry, _overridden(material, _material(entry))))
-    segments = tuple(_segment(entry, values) for entry, values in stretches)
+    density = table.number("density", *DENSITY_RANGE, "kg/m^3") if "density" in table else None
+    vary = len({tuple(values.get(key) for key in _DIAMETERS) for _, values in stretches}) > 1
+    segments = tuple(_segment(entry, values, vary) for entry, values in stretches)
     inner = [values["inner_diameter"] for _, values in stretches if "inner_diameter" in values]
     outer = [values["outer_diameter"] for _, values in stretches if "outer_diameter" in values]
     with table.blamed():
-        return Tube(name, segments, min(inner, default=None), max(outer, default=None))
+        return Tube(name, segments, min(inner, default=None), max(outer, default=None), density)
 
 
-def _segment(table: Table, material: Mapping[str, float]) -> Segment:
+def _segment(table: Table, material: Mapping[str, float], diameters_vary: bool) -> Segment:
     length = table.number("length", *LENGTH_RANGE, "m")
     coefficients, turn = _pre_curvature(table)
     bending_stiffness, torsional_stiffness = _stiffness(table, material)
+    # Where diameters vary, those of the tube are a summary, and the area is the segment's own.
+    own_area = diameters_vary and all(key in material for key in _DIAMETERS)
+    area = annulus_area(*(material[key] for key in _DIAMETERS)) if own_area else None
     # A law of too much curvature is blamed on the key that makes it.
     written = next((key for key in (*_POLYNOMIAL, "curvature") if key in table), "curvature")
     blame = {f"curvature[{index}]": written for index in range(len(coefficients))}
     with table.blamed(blame):
-        return Segment(length, bending_stiffness, torsional_stiffness, coefficients, turn)
+        return Segment(length, bending_stiffness, torsional_stiffness, coefficients, turn, area)
 
 
 def _pre_curvature(table: Table) -> tuple[tuple[complex, ...], float]:

@@ -25,9 +25,12 @@ from ctr_pvs.errors import RobotError
 from ctr_pvs.robot.command import LARGEST_ALPHA
 from ctr_pvs.robot.command import CommandBounds
 from ctr_pvs.robot.command import Range
+from ctr_pvs.robot.cross_section import annulus_area
 
 LENGTH_RANGE = (1e-7, 1e3)  # m, of a segment; the shortest is far above the slack within which boundaries coincide
 DIAMETER_RANGE = (0.0, 10.0)  # m
+AREA_RANGE = (0.0, 100.0)  # m^2
+DENSITY_RANGE = (30.0, 3e4)  # kg/m^3; lighter than any foam to denser than osmium. Metals in g/cm^3 lie below
 STIFFNESS_RANGE = (1e-18, 1e12)  # N m^2; a 2.4 mm nitinol tube has 0.05
 MODULUS_RANGE = (1e3, 1e13)  # Pa; softer than any gel to stiffer than diamond
 LARGEST_CURVATURE = 1e6  # 1/m
@@ -51,6 +54,7 @@ class Segment:
             kappa_y + i kappa_z = exp(i turn X) sum_k c_k X^k, with X the segment's own abscissa, 0 at its base side.
             Trailing zeros are dropped; empty means straight.
         turn: rad/m; with a constant curvature the rest shape is a helix.
+        area: of the material's cross section, m^2, for its weight; None where the tube's diameters tell it.
 
     Raises:
         RobotError: for a value out of range.
@@ -61,6 +65,7 @@ class Segment:
     torsional_stiffness: float
     curvature: tuple[complex, ...] = ()
     turn: float = 0.0
+    area: float | None = None
 
     def __post_init__(self) -> None:
         _set(self, "length", number_in("length", self.length, *LENGTH_RANGE, "m"))
@@ -68,6 +73,8 @@ class Segment:
             _set(self, field, number_in(field, getattr(self, field), *STIFFNESS_RANGE, "N m^2"))
         _set(self, "turn", number_in("turn", self.turn, -LARGEST_TURN, LARGEST_TURN, "rad/m"))
         _set(self, "curvature", _coefficients(self.curvature, self.length))
+        if self.area is not None:
+            _set(self, "area", number_in("area", self.area, *AREA_RANGE, "m^2"))
 
     @property
     def is_straight(self) -> bool:
@@ -96,7 +103,9 @@ class Tube:
         name: unique in its robot.
         segments: at least one.
         inner_diameter, outer_diameter: m, both or neither; where they vary along the tube, the smallest bore and the
-            largest outside. They serve to check that tubes fit and to draw them: stiffness is the segments' own.
+            largest outside. They serve to check that tubes fit, to draw them, and for the weight of segments without
+            an area of their own: stiffness is the segments' own.
+        density: of the material, kg/m^3, for its weight.
 
     Raises:
         RobotError: for a value out of range.
@@ -106,6 +115,7 @@ class Tube:
     segments: tuple[Segment, ...]
     inner_diameter: float | None = None
     outer_diameter: float | None = None
+    density: float | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not _NAME.fullmatch(self.name):
@@ -118,6 +128,8 @@ class Tube:
             inner, outer = check_diameters(self.inner_diameter, self.outer_diameter)
             _set(self, "inner_diameter", inner)
             _set(self, "outer_diameter", outer)
+        if self.density is not None:
+            _set(self, "density", number_in("density", self.density, *DENSITY_RANGE, "kg/m^3"))
 
     @cached_property
     def breaks(self) -> NDArray[np.float64]:
@@ -130,6 +142,14 @@ class Tube:
     def length(self) -> float:
         """m; equal to the last break to the last bit."""
         return float(self.breaks[-1])
+
+    @cached_property
+    def areas(self) -> tuple[float | None, ...]:
+        """Of the material's cross section in each segment [m^2]; None where it is not known."""
+        areas = tuple(segment.area for segment in self.segments)
+        if any(area is not None for area in areas) or self.inner_diameter is None or self.outer_diameter is None:
+            return areas  # where segments have their own, the tube's diameters are a summary and tell no area
+        return (annulus_area(self.inner_diameter, self.outer_diameter),) * len(areas)
 
 
 @dataclass(frozen=True)
@@ -204,24 +224,6 @@ class Robot:
             CommandError: for what clamping cannot mend: a wrong count, a value that is not a finite real number.
         """
         return self._bounds.clamp(alpha, D)
-
-
-def annulus_stiffness(
-    youngs_modulus: float, shear_modulus: float, inner_diameter: float, outer_diameter: float
-) -> tuple[float, float]:
-    """(K, G J) [N m^2] of a round tube: I = pi/64 (d_o^4 - d_i^4), J = 2 I.
-
-    Args:
-        youngs_modulus, shear_modulus: Pa.
-        inner_diameter, outer_diameter: m.
-    """
-    second_moment = math.pi / 64.0 * (outer_diameter**4 - inner_diameter**4)
-    return youngs_modulus * second_moment, shear_modulus * 2.0 * second_moment
-
-
-def shear_modulus_from_poisson(youngs_modulus: float, poissons_ratio: float) -> float:
-    """G = E / (2 (1 + nu)) [Pa] of an isotropic material."""
-    return youngs_modulus / (2.0 * (1.0 + poissons_ratio))
 
 
 def number_in(field: str, value: object, low: float, high: float, unit: str = "") -> float:

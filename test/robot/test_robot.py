@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from ctr_pvs.errors import RobotError
+from ctr_pvs.robot.cross_section import annulus_stiffness
+from ctr_pvs.robot.cross_section import shear_modulus_from_poisson
 from ctr_pvs.robot.robot import Limits
 from ctr_pvs.robot.robot import Robot
 from ctr_pvs.robot.robot import Segment
 from ctr_pvs.robot.robot import Tube
-from ctr_pvs.robot.robot import annulus_stiffness
-from ctr_pvs.robot.robot import shear_modulus_from_poisson
 
 STRAIGHT = Segment(0.125, 0.05, 0.04)
 ARC = Segment(0.025, 0.05, 0.04, (9.9,))
