@@ -8,7 +8,10 @@ from ctr_pvs.kernel.arrays import BEFORE
 from ctr_pvs.kernel.arrays import COUPLED
 from ctr_pvs.kernel.arrays import FIRST
 from ctr_pvs.kernel.arrays import GAUSS
+from ctr_pvs.kernel.arrays import LEAD
 from ctr_pvs.kernel.arrays import LENGTH
+from ctr_pvs.kernel.arrays import MU
+from ctr_pvs.kernel.arrays import MU_SIZE
 from ctr_pvs.kernel.arrays import N_ELEMENTS
 from ctr_pvs.kernel.arrays import PLACE
 from ctr_pvs.kernel.arrays import POLYNOMIAL
@@ -22,7 +25,8 @@ from ctr_pvs.kernel.arrays import Array
 from ctr_pvs.kernel.arrays import Scene
 from ctr_pvs.kernel.arrays import Y
 from ctr_pvs.kernel.compiler import compiled
-from ctr_pvs.kernel.twist.element import spread_angles
+from ctr_pvs.kernel.twist.fields import mu_scale
+from ctr_pvs.kernel.twist.fields import spread_angles
 
 
 @compiled
@@ -56,6 +60,48 @@ def carry(old: Scene, new: Scene, rules: Array) -> None:
                     new.vectors[Y, first + k] = ratio * value
             else:
                 sample(old, new, rules, m, j)
+    if new.counts[LEAD] > 0:
+        carry_mu(old, new, rules, same)
+
+
+@compiled
+def carry_mu(old: Scene, new: Scene, rules: Array, same: bool) -> None:
+    """Gives ``new`` the mu of ``old``, none where no load acted."""
+    for m in range(new.counts[N_ELEMENTS]):
+        size, first = new.marks[m, MU_SIZE], new.marks[m, MU]
+        for k in range(2 * size):
+            new.vectors[Y, first + k] = 0.0
+        if same:
+            before, ratio = old.marks[m, MU_SIZE], mu_scale(old, m) / mu_scale(new, m)
+            for k in range(min(size, before)):
+                for side in range(2):
+                    value = old.vectors[Y, old.marks[m, MU] + side * before + k]
+                    new.vectors[Y, first + side * size + k] = ratio * value
+            continue
+        G = new.marks[m, GAUSS]
+        for g in range(G if size > 0 else 0):
+            mu = mu_between(old, new.gauss[new.marks[m, ROW] + g, PLACE])
+            mu *= rules[G, g, WEIGHT] / mu_scale(new, m)
+            for k in range(size):
+                new.vectors[Y, first + k] += mu.real * rules[G, g, POLYNOMIAL + k]
+                new.vectors[Y, first + size + k] += mu.imag * rules[G, g, POLYNOMIAL + k]
+
+
+@compiled
+def mu_between(scene: Scene, s: float) -> complex:
+    """mu [N m] at the arc length s [m]; none past the tips."""
+    M = scene.counts[N_ELEMENTS]
+    m = find_element(scene, s)
+    if M == 0 or s > scene.line[M, ARC] or scene.marks[m, MU_SIZE] == 0:
+        return 0j
+    first, size = scene.marks[m, MU], scene.marks[m, MU_SIZE]
+    x = 2.0 * (s - scene.line[m, ARC]) / scene.line[m, LENGTH] - 1.0
+    value, before, here = 0j, 0.0, 1.0
+    for k in range(size):
+        y = complex(scene.vectors[Y, first + k], scene.vectors[Y, first + size + k])
+        value += y * here * (2.0 * k + 1.0) ** 0.5
+        before, here = here, ((2.0 * k + 1.0) * x * here - k * before) / (k + 1.0)
+    return mu_scale(scene, m) * value
 
 
 @compiled
@@ -66,6 +112,9 @@ def drop_finer(scene: Scene, finer: int) -> None:
             if scene.parts[SIZE, m, j] > 1:
                 for k in range(scene.parts[SIZE, m, j] - finer, scene.parts[SIZE, m, j]):
                     scene.vectors[Y, scene.parts[FIRST, m, j] + k] = 0.0
+        first, size = scene.marks[m, MU], scene.marks[m, MU_SIZE]
+        for k in range(max(size - finer, 0), size):
+            scene.vectors[Y, first + k], scene.vectors[Y, first + size + k] = 0.0, 0.0
 
 
 @compiled

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 
+from ctr_pvs.kernel.arrays import MOMENTS
 from ctr_pvs.kernel.arrays import N_UNKNOWNS
 from ctr_pvs.kernel.arrays import OTHER
 from ctr_pvs.kernel.arrays import RIGID
@@ -23,23 +24,21 @@ from ctr_pvs.kernel.carry import carry
 from ctr_pvs.kernel.carry import drop_finer
 from ctr_pvs.kernel.compiler import compiled
 from ctr_pvs.kernel.compiler import entry_point
-from ctr_pvs.kernel.layout import FINER
 from ctr_pvs.kernel.layout import holds
 from ctr_pvs.kernel.layout import prepare
+from ctr_pvs.kernel.sections import FINER
 from ctr_pvs.kernel.twist.condensation import factorize
 from ctr_pvs.kernel.twist.element import EXACT
 from ctr_pvs.kernel.twist.element import energy_gradient
 from ctr_pvs.kernel.twist.element import energy_value
+from ctr_pvs.kernel.twist.fields import FINE
 from ctr_pvs.kernel.twist.flow import AT_REST
 from ctr_pvs.kernel.twist.flow import NUDGE
 from ctr_pvs.kernel.twist.flow import flow
 from ctr_pvs.kernel.twist.flow import soften
 from ctr_pvs.kernel.twist.newton import twist_size
 from ctr_pvs.kernel.twist.relaxed import relax
-from ctr_pvs.kernel.walk.cold import cold
-from ctr_pvs.kernel.walk.cold import raise_degrees
-from ctr_pvs.kernel.walk.cold import settle_down
-from ctr_pvs.kernel.walk.path import follow
+from ctr_pvs.kernel.walk.alone import cold
 from ctr_pvs.kernel.walk.step import MORE
 from ctr_pvs.kernel.walk.step import NOT_PROVEN
 from ctr_pvs.kernel.walk.step import OK
@@ -52,26 +51,37 @@ from ctr_pvs.kernel.walk.step import write_state
 WORKSPACE = "float64[:, :, ::1], int64[::1], float64[:, :, ::1], float64[::1], int64[::1]"
 
 
-@entry_point(f"int64({WORKSPACE}, float64[::1], float64[::1], float64[::1], float64, boolean, float64[::1])")
-def advance(
+@entry_point(
+    f"int64({WORKSPACE}, float64[::1], float64[::1], float64[::1], float64[::1], float64, int64, int64, float64, "
+    "boolean, boolean, float64[::1], float64[:, ::1], int64[::1])"
+)
+def take_steps(
     tubes: Array, segments: Ints, rules: Array, floats: Array, ints: Ints, last: Array, alpha: Array, D: Array,
-    tolerance: float, untwisted: bool, out: Array,
+    loads: Array, tolerance: float, raised: int, floor: int, slack: float, untwisted: bool, tip: bool, out: Array,
+    room: Array, codes: Ints,
 ) -> int:  # fmt: skip
-    """From the state ``last`` to the command (alpha, D) in one proven step, at the smallest degrees that meet
-    ``tolerance`` [m]; see ``step.step``."""
-    kit = Kit(tubes, segments, rules, floats, ints)
-    came = step(kit, last, alpha, D, tolerance, 0, 0, 0.0, untwisted, True, out)
-    return raise_degrees(kit, alpha, D, tolerance, came, out)
+    """One step or many cold starts: one entry point, so that steps are compiled once.
 
-
-@entry_point(f"int64({WORKSPACE}, float64[::1], float64, boolean, float64[::1])")
-def settle_state(
-    tubes: Array, segments: Ints, rules: Array, floats: Array, ints: Ints, state: Array, tolerance: float,
-    untwisted: bool, out: Array,
-) -> int:  # fmt: skip
-    """See ``cold.settle_down``."""
+    Without ``codes``, from the state ``last`` to the command (alpha, D) and packed ``loads`` in one step that is
+    checked; see ``step.step``.  With codes (M,), cold starts at the commands alpha, D (M N,) without loads: the first
+    numbers of their states into ``out`` (M W,), what ``alone.cold`` says into ``codes``; room (2, R) : for states.
+    Rows whose code is not -1 are passed over, so that a TOO_SMALL call can be repeated.
+    """
     kit = Kit(tubes, segments, rules, floats, ints)
-    return settle_down(kit, state, tolerance, untwisted, out)
+    if len(codes) == 0:
+        return step(kit, last, alpha, D, loads, tolerance, raised, floor, slack, untwisted, tip, out)
+    N, width = len(segments), len(out) // len(codes)
+    for row in range(len(codes)):
+        if codes[row] >= 0:
+            continue
+        a = row * N
+        came = cold(kit, alpha[a : a + N], D[a : a + N], tolerance, untwisted, room[0], room[1])
+        if came == TOO_SMALL:
+            return TOO_SMALL
+        codes[row] = came
+        for i in range(min(width, room.shape[1])):
+            out[row * width + i] = room[1, i]
+    return OK
 
 
 @entry_point(f"int64({WORKSPACE}, float64[::1], float64[::1], float64, float64[::1])")
@@ -83,32 +93,17 @@ def untwisted_state(
     is not stable."""
     kit = Kit(tubes, segments, rules, floats, ints)
     scene, bench = scene_of(kit, 0), bench_of(kit)
-    if not prepare(kit, scene, D, tolerance, 0, 0):
+    if not prepare(kit, scene, D, alpha[:0], tolerance, 0, 0):
         return TOO_SMALL
     for u in range(scene.counts[N_UNKNOWNS]):
         scene.vectors[Y, u] = 0.0
-    energy_gradient(scene, rules, alpha)
-    if not factorize(scene, bench, rules, 1, EXACT, 0.0, 0.0, -1.0):
+    energy_gradient(scene, bench, tubes, rules, alpha)
+    if not factorize(scene, bench, rules, FINE, EXACT, 0.0, 0.0, -1.0):
         return NOT_PROVEN
     if not write_state(scene, alpha, 0, RIGID, out):
         return TOO_SMALL
     finish(scene, bench, tubes, rules, alpha, math.inf, tolerance, out)
     return OK
-
-
-@entry_point(
-    f"int64({WORKSPACE}, float64[::1], float64[::1], float64[::1], float64, int64, int64, float64[::1], float64[::1], "
-    "float64[::1])"
-)
-def follow_path(
-    tubes: Array, segments: Ints, rules: Array, floats: Array, ints: Ints, begin: Array, end: Array, clock: Array,
-    tolerance: float, floor: int, most: int, state: Array, ahead: Array, command: Array,
-) -> int:  # fmt: skip
-    """See ``path.follow``; ``floor`` : least degree."""
-    kit = Kit(tubes, segments, rules, floats, ints)
-    return follow(
-        kit, begin, end, clock, tolerance, 0, floor, most, state, ahead, command
-    )  # fmt: skip
 
 
 @entry_point(f"int64({WORKSPACE}, float64[::1], float64, int64, float64[:, ::1], float64[::1])")
@@ -121,9 +116,9 @@ def relaxed_state(
     work (7, N) : room."""
     kit = Kit(tubes, segments, rules, floats, ints)
     scene, bench = scene_of(kit, 0), bench_of(kit)
-    if not prepare(kit, scene, D, tolerance, 0, floor):
+    if not prepare(kit, scene, D, D[:0], tolerance, 0, floor):
         return TOO_SMALL
-    found = relax(scene, bench, rules, work[6], work)
+    found = relax(scene, bench, tubes, rules, work[6], work)
     if found == 0:
         return NOT_PROVEN
     if not write_state(scene, work[6], 0, TWISTED, out):
@@ -136,56 +131,60 @@ def land(
     tubes: Array, segments: Ints, rules: Array, floats: Array, ints: Ints, state: Array, command: Array, clock: Array,
     tolerance: float, floor: int, most: int, out: Array,
 ) -> int:  # fmt: skip
-    """Where the gradient flow from ``state`` lands at ``command`` (2 N,), just past the fold, into ``out``.
+    """Where the gradient flow from ``state`` lands at ``command``, alpha, D and packed loads, just past the fold, into
+    ``out``.
 
     OK at a stable equilibrium; NOT_PROVEN if the state is still held there, or does not come to rest; MORE if there is
     more to go after ``most`` steps: then ``out`` is where it is.  clock (5,) : see ``flow.flow``, to begin with zeros;
-    then energies [J] before and after.
+    then energies [J] before and after, NaN where point
+    moments act.
     """
     kit = Kit(tubes, segments, rules, floats, ints)
     N = len(segments)
-    alpha, D = command[:N], command[N:]
+    alpha, D, loads = command[:N], command[N : 2 * N], command[2 * N :]
     begun = clock[2] > 0.0
-    came = step_aside(kit, out if begun else state, alpha, D, tolerance, floor)
+    came = step_aside(kit, out if begun else state, D, loads, tolerance, floor)
     if came < 0:
         return TOO_SMALL
     scene, bench = scene_of(kit, came), bench_of(kit)
     drop_finer(scene, FINER)  # the path was followed without them, and its landing is to be
     if not begun:
-        clock[0], clock[1], clock[2], clock[3] = 0.0, 0.1, AT_REST, energy_value(scene, rules, alpha)
-        soften(scene, bench, rules, alpha)
+        clock[0], clock[1], clock[2], clock[3] = 0.0, 0.1, AT_REST, energy_value(scene, tubes, rules, alpha)
+        soften(scene, bench, tubes, rules, alpha)
         for u in range(scene.counts[N_UNKNOWNS]):
             scene.vectors[Y, u] += scene.vectors[OTHER, u]
-    ended = flow(scene, bench, rules, alpha, clock, most)
+    ended = flow(scene, bench, tubes, rules, alpha, clock, most)
     if not write_state(scene, alpha, 0, TWISTED, out):
         clock[2] = 0.0
         return TOO_SMALL
     if ended < 1:
         return MORE if ended == 0 else NOT_PROVEN
-    clock[4] = energy_value(scene, rules, alpha)
-    came = step_aside(kit, state, alpha, D, tolerance, floor)
+    clock[4] = energy_value(scene, tubes, rules, alpha)
+    if scene.counts[MOMENTS] > 0:
+        clock[3], clock[4] = math.nan, math.nan
+    came = step_aside(kit, state, D, loads, tolerance, floor)
     if came < 0:
         return TOO_SMALL
     scene = scene_of(kit, came)
     for u in range(scene.counts[N_UNKNOWNS]):
-        scene.vectors[OTHER, u] = out[STATE + 3 * N + u] - scene.vectors[Y, u]
-    return OK if twist_size(scene, scene.vectors[OTHER], 1) > NUDGE else NOT_PROVEN
+        scene.vectors[OTHER, u] = out[STATE + 3 * N + len(loads) + u] - scene.vectors[Y, u]
+    return OK if twist_size(scene, scene.vectors[OTHER], FINE) > NUDGE else NOT_PROVEN
 
 
 @compiled
 def step_aside(
-    kit: Kit, state: Array, alpha: Array, D: Array,
+    kit: Kit, state: Array, D: Array, loads: Array,
     tolerance: float, floor: int,
 ) -> int:  # fmt: skip
-    """Carries ``state`` to the command (alpha, D) as it is; the scene that then holds it, -1 if the workspace is too
+    """Carries ``state`` to D and packed ``loads`` as it is; the scene that then holds it, -1 if the workspace is too
     small."""
     from_scene = open_state(kit, state, tolerance)
     if from_scene < 0:
         return -1
     old, new = scene_of(kit, from_scene), scene_of(kit, 1 - from_scene)
-    if holds(old, D, 0, floor):
+    if holds(old, D, loads, 0, floor):
         return from_scene
-    if not prepare(kit, new, D, tolerance, 0, floor):
+    if not prepare(kit, new, D, loads, tolerance, 0, floor):
         return -1
     carry(old, new, kit.rules)
     return 1 - from_scene
@@ -199,33 +198,8 @@ def blank_state(
     """A state at (alpha, D) with degrees of at least ``floor`` and no twist, not solved for."""
     kit = Kit(tubes, segments, rules, floats, ints)
     scene = scene_of(kit, 0)
-    if not prepare(kit, scene, D, tolerance, 0, floor):
+    if not prepare(kit, scene, D, alpha[:0], tolerance, 0, floor):
         return TOO_SMALL
     for u in range(scene.counts[N_UNKNOWNS]):
         scene.vectors[Y, u] = 0.0
     return OK if write_state(scene, alpha, 0, TWISTED, out) else TOO_SMALL
-
-
-@entry_point(
-    f"int64({WORKSPACE}, float64[:, ::1], float64[:, ::1], float64, boolean, float64[:, ::1], float64[:, ::1], "
-    "int64[::1])"
-)
-def cold_rows(
-    tubes: Array, segments: Ints, rules: Array, floats: Array, ints: Ints, alpha: Array, D: Array, tolerance: float,
-    untwisted: bool, room: Array, out: Array, codes: Ints,
-) -> int:  # fmt: skip
-    """Cold starts at the commands alpha, D (M, N): the first columns of their states into ``out`` (M, STATE + 3 N), and
-    what ``cold.cold`` says into codes (M,).  Rows whose code is not -1 are passed over, so that a TOO_SMALL call can be
-    repeated."""
-    kit = Kit(tubes, segments, rules, floats, ints)
-    for row in range(len(alpha)):
-        if codes[row] >= 0:
-            continue
-        state = room[3]
-        came = cold(kit, alpha[row], D[row], tolerance, untwisted, room, state)
-        if came == TOO_SMALL:
-            return TOO_SMALL
-        codes[row] = came
-        for i in range(min(out.shape[1], len(state))):
-            out[row, i] = state[i]
-    return OK

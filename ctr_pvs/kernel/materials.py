@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import cmath
+import math
 
 from ctr_pvs.kernel.arrays import ABSENT
 from ctr_pvs.kernel.arrays import BENDING
@@ -106,3 +107,16 @@ def guided_segment(tubes: Array, segments: Ints, j: int, D: float) -> int:
     while i > 0 and tubes[j, i, START] >= D:
         i -= 1
     return i
+
+
+@compiled
+def pre_curvature_rate(tubes: Array, j: int, i: int, X: float) -> complex:
+    """d/dX of ``pre_curvature`` [1/m^2]."""
+    x, turn = X - tubes[j, i, START], tubes[j, i, TURN]
+    rate, power = 0j, (tubes.shape[2] - CURVATURE) // 2 - 1
+    for k in range(tubes.shape[2] - 2, CURVATURE, -2):
+        rate = rate * x + power * complex(tubes[j, i, k], tubes[j, i, k + 1])
+        power -= 1
+    if turn != 0.0:
+        rate = rate * complex(math.cos(turn * x), math.sin(turn * x)) + 1j * turn * pre_curvature(tubes, j, i, X)
+    return rate

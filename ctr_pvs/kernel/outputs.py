@@ -5,22 +5,19 @@ from __future__ import annotations
 import math
 
 from ctr_pvs.kernel.actuation import actuation_loads
-from ctr_pvs.kernel.actuation import twist_rates
-from ctr_pvs.kernel.arrays import ALPHA_RATE
 from ctr_pvs.kernel.arrays import ANGLE
-from ctr_pvs.kernel.arrays import ANSWERED
 from ctr_pvs.kernel.arrays import ARC
 from ctr_pvs.kernel.arrays import COUPLED
-from ctr_pvs.kernel.arrays import D_RATE
 from ctr_pvs.kernel.arrays import DEGREE
-from ctr_pvs.kernel.arrays import EXPLICIT
 from ctr_pvs.kernel.arrays import FIRST
 from ctr_pvs.kernel.arrays import GAUSS
 from ctr_pvs.kernel.arrays import INTEGRAL
+from ctr_pvs.kernel.arrays import LEAD
 from ctr_pvs.kernel.arrays import LEADER
+from ctr_pvs.kernel.arrays import MOMENT_FAR
 from ctr_pvs.kernel.arrays import N_ELEMENTS
+from ctr_pvs.kernel.arrays import N_FAR
 from ctr_pvs.kernel.arrays import N_UNKNOWNS
-from ctr_pvs.kernel.arrays import NONE
 from ctr_pvs.kernel.arrays import PLACE
 from ctr_pvs.kernel.arrays import REST
 from ctr_pvs.kernel.arrays import RIGID
@@ -34,7 +31,7 @@ from ctr_pvs.kernel.arrays import SIZE
 from ctr_pvs.kernel.arrays import STATE
 from ctr_pvs.kernel.arrays import STIFFNESS
 from ctr_pvs.kernel.arrays import TORQUE
-from ctr_pvs.kernel.arrays import TURNED_BY
+from ctr_pvs.kernel.arrays import TORQUES
 from ctr_pvs.kernel.arrays import TWISTED
 from ctr_pvs.kernel.arrays import WEIGHT
 from ctr_pvs.kernel.arrays import Array
@@ -53,14 +50,16 @@ from ctr_pvs.kernel.carry import guide_torque
 from ctr_pvs.kernel.carry import torque_at
 from ctr_pvs.kernel.compiler import entry_point
 from ctr_pvs.kernel.entries import WORKSPACE
-from ctr_pvs.kernel.sensitivity import answer_rates
-from ctr_pvs.kernel.sensitivity import answered_ends
-from ctr_pvs.kernel.sensitivity import tip_rates
+from ctr_pvs.kernel.loaded.statics import forces_work
+from ctr_pvs.kernel.sensitivity import command_rates
+from ctr_pvs.kernel.sensitivity import load_rates
 from ctr_pvs.kernel.twist.condensation import factorize
 from ctr_pvs.kernel.twist.element import EXACT
 from ctr_pvs.kernel.twist.element import energy_gradient
-from ctr_pvs.kernel.twist.element import spread_angles
-from ctr_pvs.kernel.walk.path import margin_of
+from ctr_pvs.kernel.twist.fields import FINE
+from ctr_pvs.kernel.twist.fields import spread_angles
+from ctr_pvs.kernel.twist.fields import twist_energy
+from ctr_pvs.kernel.twist.margin import stability_margin
 from ctr_pvs.kernel.walk.step import NOT_PROVEN
 from ctr_pvs.kernel.walk.step import OK
 from ctr_pvs.kernel.walk.step import TOO_SMALL
@@ -75,7 +74,10 @@ def margin(
 ) -> float:
     """The stability margin of ``state``; NaN if the workspace is too small."""
     kit = Kit(tubes, segments, rules, floats, ints)
-    return margin_of(kit, state, tolerance)
+    which = open_state(kit, state, tolerance)
+    if which < 0:
+        return math.nan
+    return stability_margin(scene_of(kit, which), bench_of(kit), tubes, rules, state[STATE : STATE + len(segments)])
 
 
 @entry_point(f"int64({WORKSPACE}, float64[::1], float64, float64[:, ::1])")
@@ -83,61 +85,68 @@ def loads(
     tubes: Array, segments: Ints, rules: Array, floats: Array, ints: Ints, state: Array, tolerance: float, out: Array
 ) -> int:
     """Actuation loads and energy of ``state`` into out (6, N): torque, force towards +D and -D, kinks; then elastic
-    energy [J] and stability margin."""
+    energy [J], and the work of the loads' forces [J]."""
     kit = Kit(tubes, segments, rules, floats, ints)
     N = len(segments)
     which = open_state(kit, state, tolerance)
     if which < 0:
         return TOO_SMALL
     scene, bench = scene_of(kit, which), bench_of(kit)
-    spread_angles(scene, state[STATE : STATE + N], scene.vectors[Y])
-    bend(scene, rules, bench.lines[NONE])
-    twist_rates(scene, rules)
-    actuation_loads(scene, tubes, segments, rules, state[S_TWISTS] == TWISTED, bench.rates, out)
-    twist = 0.0
-    for u in range(scene.counts[N_UNKNOWNS]):
-        twist += 0.5 * scene.vectors[Y, u] * scene.vectors[Y, u]
-    out[4, 0] += twist + out[5, 0]
+    energy_gradient(scene, bench, tubes, rules, state[STATE : STATE + N])
+    bend(scene, rules)
+    if not is_framed(scene):
+        chain(scene, tubes, rules)
+    actuation_loads(scene, bench, tubes, segments, state[S_TWISTS] == TWISTED, out)
+    out[4, 0] += twist_energy(scene) + out[5, 0]
+    out[5, 0] = forces_work(scene) if scene.counts[LEAD] > 0 else 0.0
     return OK
 
 
-@entry_point(f"int64({WORKSPACE}, float64[::1], float64, float64[:, ::1], float64[:, ::1])")
-def jacobian(
-    tubes: Array, segments: Ints, rules: Array, floats: Array, ints: Ints, state: Array, tolerance: float, out: Array,
-    gain: Array,
-) -> int:  # fmt: skip
-    """Rates of the tip of ``state`` with alpha and D into out (2 N, 6), position [m] and rotation [rad] in base axes,
-    and of the turn at each tube's own end with alpha into gain (N, N).  NOT_PROVEN where the state is not stable."""
+@entry_point(f"int64({WORKSPACE}, float64[::1], float64, float64[::1])")
+def base_wrench(
+    tubes: Array, segments: Ints, rules: Array, floats: Array, ints: Ints, state: Array, tolerance: float, out: Array
+) -> int:
+    """Force [N] and moment [N m] about the orifice that all beyond it exerts there, into out (6,)."""
     kit = Kit(tubes, segments, rules, floats, ints)
-    N = len(segments)
     which = open_state(kit, state, tolerance)
     if which < 0:
         return TOO_SMALL
     scene, bench = scene_of(kit, which), bench_of(kit)
-    alpha = state[STATE : STATE + N]
-    energy_gradient(scene, rules, alpha)
-    twists = state[S_TWISTS] != RIGID
-    if twists and not factorize(scene, bench, rules, 1, EXACT, 0.0, 0.0, -1.0):
-        return NOT_PROVEN
-    for j in range(N):
-        bench.lines[TURNED_BY, j] = scene.held[TORQUE, 0, j] if twists else 0.0
-    bend(scene, rules, alpha)
-    chain(scene, tubes, rules)
+    energy_gradient(scene, bench, tubes, rules, state[STATE : STATE + len(segments)])
     M = scene.counts[N_ELEMENTS]
-    alpha_rate, D_rate = bench.lines[ALPHA_RATE], bench.lines[D_RATE]
-    ends, explicit, answered = bench.ends, bench.moved[EXPLICIT], bench.moved[ANSWERED]
-    for p in range(2 * N):
-        for j in range(N):
-            alpha_rate[j] = 1.0 if p == j else 0.0
-            D_rate[j] = 1.0 if p == N + j else 0.0
-        answer_rates(
-            scene, bench, tubes, segments, rules, alpha_rate, D_rate, bench.lines[TURNED_BY], ends, explicit, twists
-        )
-        answered_ends(scene, answered)
-        tip_rates(scene, bench, tubes, rules, scene.counts[LEADER], D_rate, ends, explicit, answered, out[p])
-        if p < N:
-            for j in range(N):
-                gain[j, p] = explicit[M, j] + answered[M, j]
+    for i in range(3):
+        out[i], out[3 + i] = scene.statics[M, N_FAR + i], scene.statics[M, MOMENT_FAR + i]
+    return OK
+
+
+@entry_point(f"int64({WORKSPACE}, float64[::1], float64, float64[:, ::1], float64[:, ::1], float64[:, ::1])")
+def jacobian(
+    tubes: Array, segments: Ints, rules: Array, floats: Array, ints: Ints, state: Array, tolerance: float, out: Array,
+    gain: Array, actuation: Array,
+) -> int:  # fmt: skip
+    """Rates of the tip of ``state`` with alpha and D into the first rows of out (2 N + 6, 6), position [m] and rotation
+    [rad] in base axes, and of the turn at each tube's own end with alpha into gain (N, N).
+
+    Under load, with force and moment on the tip into the last rows of ``out``, and those of torques and forces into
+    actuation (2 N, 6).  NOT_PROVEN where the state is not stable.
+    """
+    kit = Kit(tubes, segments, rules, floats, ints)
+    which = open_state(kit, state, tolerance)
+    if which < 0:
+        return TOO_SMALL
+    scene, bench = scene_of(kit, which), bench_of(kit)
+    energy_gradient(scene, bench, tubes, rules, state[STATE : STATE + len(segments)])
+    twists = state[S_TWISTS] != RIGID
+    if twists and not factorize(scene, bench, rules, FINE, EXACT, 0.0, 0.0, -1.0):
+        return NOT_PROVEN
+    for j in range(len(segments)):
+        bench.lines[TORQUES, j] = scene.held[TORQUE, 0, j] if twists else 0.0
+    if scene.counts[LEAD] == 0:
+        bend(scene, rules)
+        chain(scene, tubes, rules)
+    else:
+        load_rates(scene, bench, tubes, segments, rules, out[2 * len(segments) :])
+    command_rates(scene, bench, tubes, segments, rules, twists, out, gain, actuation)
     return OK
 
 
@@ -156,7 +165,7 @@ def backbone(
     scene, bench = scene_of(kit, which), bench_of(kit)
     spread_angles(scene, state[STATE : STATE + N], scene.vectors[Y])
     if not is_framed(scene):
-        bend(scene, rules, bench.lines[NONE])
+        bend(scene, rules)
         chain(scene, tubes, rules)
     trace(scene, bench, tubes, rules, scene.counts[LEADER] if tube < 0 else tube, s, position, orientation)
     return OK
@@ -211,12 +220,12 @@ def describe(
     which = open_state(kit, state, tolerance)
     if which < 0:
         return TOO_SMALL
-    scene = scene_of(kit, which)
+    scene, bench = scene_of(kit, which), bench_of(kit)
     alpha = state[STATE : STATE + N]
-    energy_gradient(scene, rules, alpha)
+    energy_gradient(scene, bench, tubes, rules, alpha)
     if not write_state(scene, alpha, int(state[S_STEPS]), TWISTED, out):
         return TOO_SMALL
-    bend(scene, rules, alpha)
+    bend(scene, rules)
     put_tip(scene, tubes, rules, out)
     out[S_ESTIMATE] = math.nan
     return OK

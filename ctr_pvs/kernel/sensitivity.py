@@ -3,69 +3,72 @@
 A rate is taken at fixed torque coefficients first (the *explicit* part: elements stretch, material slides, compliances
 grow), then the unknowns answer through the Hessian.  Elements stretch because their ends ride on the tubes: an end of
 one of tube j's segments moves with -dD_j, several on one place with their mean; parts of a section share its stretch.
-
-The tip's spatial twist is the integral of Ad_g d(h xi) over x: changes of curvature turn everything beyond, changes of
-length push it along the tangent (eq. (36)-(37), integrated at fixed x).
 """
 
 from __future__ import annotations
 
-import math
-
 from ctr_pvs.kernel.actuation import orifice_segments
-from ctr_pvs.kernel.actuation import pre_curvature_rate
-from ctr_pvs.kernel.actuation import segment_at
+from ctr_pvs.kernel.actuation import owns
 from ctr_pvs.kernel.arrays import ABSENT
+from ctr_pvs.kernel.arrays import ALPHA_RATE
 from ctr_pvs.kernel.arrays import ANGLE
-from ctr_pvs.kernel.arrays import ARC
+from ctr_pvs.kernel.arrays import ANSWERED
 from ctr_pvs.kernel.arrays import AT
-from ctr_pvs.kernel.arrays import BEFORE
-from ctr_pvs.kernel.arrays import BEND
-from ctr_pvs.kernel.arrays import BENDING
 from ctr_pvs.kernel.arrays import COUPLED
+from ctr_pvs.kernel.arrays import D_RATE
+from ctr_pvs.kernel.arrays import EXPLICIT
 from ctr_pvs.kernel.arrays import FIRST
 from ctr_pvs.kernel.arrays import GAUSS
-from ctr_pvs.kernel.arrays import INTERPOLANT
+from ctr_pvs.kernel.arrays import LEAD
+from ctr_pvs.kernel.arrays import LEADER
 from ctr_pvs.kernel.arrays import LENGTH
+from ctr_pvs.kernel.arrays import LOADED
+from ctr_pvs.kernel.arrays import MOMENT
+from ctr_pvs.kernel.arrays import MOMENTS
 from ctr_pvs.kernel.arrays import N_ELEMENTS
+from ctr_pvs.kernel.arrays import N_LOADS
+from ctr_pvs.kernel.arrays import N_NODES
+from ctr_pvs.kernel.arrays import N_POINTS
 from ctr_pvs.kernel.arrays import N_UNKNOWNS
 from ctr_pvs.kernel.arrays import NONE
 from ctr_pvs.kernel.arrays import OTHER
 from ctr_pvs.kernel.arrays import PLACE
-from ctr_pvs.kernel.arrays import POSITION
-from ctr_pvs.kernel.arrays import PSI
+from ctr_pvs.kernel.arrays import POINT
+from ctr_pvs.kernel.arrays import POINT_MOMENT
 from ctr_pvs.kernel.arrays import PULL
 from ctr_pvs.kernel.arrays import ROOT
 from ctr_pvs.kernel.arrays import ROW
 from ctr_pvs.kernel.arrays import SCALE
-from ctr_pvs.kernel.arrays import SEGMENT
 from ctr_pvs.kernel.arrays import SIZE
-from ctr_pvs.kernel.arrays import SPINOR
 from ctr_pvs.kernel.arrays import STEP
 from ctr_pvs.kernel.arrays import STIFFNESS
+from ctr_pvs.kernel.arrays import TORQUES
 from ctr_pvs.kernel.arrays import TORSION
-from ctr_pvs.kernel.arrays import TURN
+from ctr_pvs.kernel.arrays import TRIAL
+from ctr_pvs.kernel.arrays import TUBE
 from ctr_pvs.kernel.arrays import TURNED
 from ctr_pvs.kernel.arrays import WEIGHT
+from ctr_pvs.kernel.arrays import WRENCH
 from ctr_pvs.kernel.arrays import Array
 from ctr_pvs.kernel.arrays import Bench
 from ctr_pvs.kernel.arrays import Ints
 from ctr_pvs.kernel.arrays import Scene
-from ctr_pvs.kernel.backbone.estimate import cross
-from ctr_pvs.kernel.backbone.frames import arc
-from ctr_pvs.kernel.backbone.frames import arc_start
-from ctr_pvs.kernel.backbone.frames import arc_turn
-from ctr_pvs.kernel.backbone.frames import is_arc
-from ctr_pvs.kernel.backbone.frames import turned_vector
+from ctr_pvs.kernel.backbone.frames import cross
+from ctr_pvs.kernel.backbone.frames import dot
+from ctr_pvs.kernel.backbone.frames import tangent
+from ctr_pvs.kernel.backbone.tip_rates import tip_rates
 from ctr_pvs.kernel.compiler import compiled
-from ctr_pvs.kernel.layout import nodes_for_turn
-from ctr_pvs.kernel.materials import pre_curvature
-from ctr_pvs.kernel.twist.condensation import substitute
-from ctr_pvs.kernel.twist.element import angles_inside
+from ctr_pvs.kernel.loaded.rates import moment_rates
+from ctr_pvs.kernel.loaded.rates import turn_frames
+from ctr_pvs.kernel.loaded.rates import twist_rates_by_moments
+from ctr_pvs.kernel.loaded.statics import gather_moments
+from ctr_pvs.kernel.loaded.tangent import solve_tangent
+from ctr_pvs.kernel.loaded.tangent import turns_at_ends
+from ctr_pvs.kernel.twist.element import clear_torques
 from ctr_pvs.kernel.twist.element import gather
-
-#: Error that quadrature along an arc may leave, relative to its length.
-ARC_ERROR = 1e-13
+from ctr_pvs.kernel.twist.fields import FINE
+from ctr_pvs.kernel.twist.fields import explicit_angle
+from ctr_pvs.kernel.twist.fields import moment_rate
 
 
 @compiled
@@ -77,7 +80,7 @@ def boundary_rates(scene: Scene, D_rate: Array, out: Array) -> None:
     for m in range(1, M + 1):
         count, total = 0, 0.0
         for j in range(len(D_rate)):
-            if segment_at(scene, m - 1, j) != segment_at(scene, m, j):
+            if owns(scene, m, j):
                 count += 1
                 total -= D_rate[j]
         if count == 0:
@@ -115,7 +118,8 @@ def explicit_angles(
 
 @compiled
 def explicit_pull(scene: Scene, tubes: Array, rules: Array, D_rate: Array, ends: Array, angles: Array) -> None:
-    """Rates of ``pull`` at the Gauss points of the coupled elements, into ``pull``, with torque coefficients held."""
+    """Rates of ``pull`` at the Gauss points of the coupled elements, into ``pull``, with torque coefficients and mu
+    held; those of the loads' moments stand in TRIAL of ``bends``."""
     N = len(D_rate)
     for m in range(scene.counts[N_ELEMENTS]):
         if not scene.marks[m, COUPLED]:
@@ -126,7 +130,7 @@ def explicit_pull(scene: Scene, tubes: Array, rules: Array, D_rate: Array, ends:
             row = scene.marks[m, ROW] + g
             share = scene.gauss[row, WEIGHT] / scene.line[m, STIFFNESS]
             along = ends[m] + rules[G, g, PLACE] * (ends[m + 1] - ends[m])
-            total, change = 0j, 0j
+            total, change = scene.bends[row, MOMENT], scene.bends[row, TRIAL]
             for j in range(N):
                 total += scene.moments[TURNED, row, j]
                 turned = explicit_angle(scene, m, row, j, angles, stretch)
@@ -140,51 +144,43 @@ def explicit_pull(scene: Scene, tubes: Array, rules: Array, D_rate: Array, ends:
 
 
 @compiled
-def explicit_angle(scene: Scene, m: int, row: int, j: int, angles: Array, stretch: float) -> float:
-    """d psi of tube j at a Gauss point of element m with torque coefficients held."""
-    return float(angles[m, j] + (scene.turns[PSI, row, j] - scene.held[ANGLE, m, j]) * stretch)
-
-
-@compiled
-def moment_rate(scene: Scene, tubes: Array, m: int, row: int, j: int, slide: float, turned: float) -> complex:
-    """Rate of a turned moment where the material slides by ``slide`` [m] and turns by ``turned`` [rad]."""
-    i = scene.parts[SEGMENT, m, j]
-    if i == ABSENT:
-        return 0j
-    rate = 1j * turned * scene.moments[TURNED, row, j]
-    if slide != 0.0:
-        psi = scene.turns[PSI, row, j]
-        steepness = tubes[j, i, BENDING] * pre_curvature_rate(tubes, j, i, scene.gauss[row, PLACE] + scene.base[AT, j])
-        rate += slide * steepness * complex(math.cos(psi), math.sin(psi))
-    return rate
-
-
-@compiled
-def answer_rates(
+def explicit_rates(
     scene: Scene, bench: Bench, tubes: Array, segments: Ints, rules: Array, alpha_rate: Array, D_rate: Array,
-    torque: Array, ends: Array, angles: Array, twists: bool,
+    wrench: Array, torque: Array, ends: Array, angles: Array, out: Array,
 ) -> None:  # fmt: skip
-    """Rates along (alpha_rate, D_rate), (N,) each, at a state whose Hessian is factorised at the finer degree.
+    """Rates of the gradient into ``out`` (U,) along (alpha_rate, D_rate), (N,) each, and ``wrench`` (6,), force and
+    moment on the tip, with torque coefficients and mu held.
 
-    ends (M + 1,) is filled with the motion of the elements' ends, angles (M + 1, N) with the explicit part of psi's
-    rates there, ``step`` with what the unknowns answer: nothing where tubes are taken for rigid in torsion.
+    ends (M + 1,) gets the motion of the elements' ends, angles (M + 1, N + 3) the rates of psi there and, under load,
+    of the frame's turn.
     """
     boundary_rates(scene, D_rate, ends)
     explicit_angles(scene, tubes, segments, alpha_rate, D_rate, torque, ends, angles)
+    clear_torques(scene)
+    for row in range(scene.counts[N_NODES]):
+        scene.bends[row, TRIAL] = 0j
+    if scene.counts[LEAD] > 0:
+        turn_frames(scene, bench, tubes, rules, D_rate, ends, angles)
+        moment_rates(scene, bench, rules, ends, wrench)
+        twist_rates_by_moments(scene, bench, angles, wrench)
+    explicit_pull(scene, tubes, rules, D_rate, ends, angles)
+    gather(scene, rules, out)
+    gather_moments(scene, rules, TRIAL, out)
+
+
+@compiled
+def answer_rates(scene: Scene, bench: Bench, rates: Array, out: Array) -> None:
+    """How the unknowns answer to ``rates`` (U,) of the gradient, into ``out`` (U,), at a state whose Hessian is
+    factorised at the finer degree."""
     for u in range(scene.counts[N_UNKNOWNS]):
-        scene.vectors[STEP, u] = 0.0
-    if twists:
-        explicit_pull(scene, tubes, rules, D_rate, ends, angles)
-        gather(scene, rules, scene.vectors[OTHER])
-        for u in range(scene.counts[N_UNKNOWNS]):
-            scene.vectors[OTHER, u] = -scene.vectors[OTHER, u]
-        substitute(scene, bench, 1, scene.vectors[OTHER], bench.lines[NONE], scene.vectors[STEP], False)
+        scene.vectors[OTHER, u] = -rates[u]
+    solve_tangent(scene, bench, FINE, scene.vectors[OTHER], bench.lines[NONE], out, 1.0)
 
 
 @compiled
 def answered_ends(scene: Scene, out: Array) -> None:
     """psi's answer to ``step`` at the elements' ends into ``out`` (M + 1, N)."""
-    for j in range(out.shape[1]):
+    for j in range(scene.base.shape[1]):
         out[0, j] = scene.base[ROOT, j] * scene.vectors[STEP, j]
         for m in range(scene.counts[N_ELEMENTS]):
             turned = (
@@ -196,114 +192,91 @@ def answered_ends(scene: Scene, out: Array) -> None:
 
 
 @compiled
-def tip_rates(
-    scene: Scene, bench: Bench, tubes: Array, rules: Array, leader: int, D_rate: Array, ends: Array, angles: Array,
-    answered: Array, out: Array,
+def load_rates(
+    scene: Scene, bench: Bench, tubes: Array, segments: Ints, rules: Array, out: Array
 ) -> None:  # fmt: skip
-    """Rates of the tip's position [m] and rotation [rad] in base axes into ``out`` (6,), from what ``answer_rates`` and
-    ``answered_ends`` have filled; frames, curvatures and turned moments are those of ``scene``."""
-    M = scene.counts[N_ELEMENTS]
-    for i in range(6):
-        out[i] = 0.0
-    for m in range(M):
-        if is_arc(scene, tubes, m):
-            along_arc(scene, bench, tubes, rules, m, D_rate, ends, angles, answered, out)
-        else:
-            along_element(scene, bench, tubes, rules, m, D_rate, ends, angles, answered, out)
-    x, yz = turned_vector(scene.frame[M, 0], scene.frame[M, 1], 1.0, 0j)
-    turned = angles[M, leader] + answered[M, leader]
-    out[3] += turned * x
-    out[4] += turned * yz.real
-    out[5] += turned * yz.imag
+    """Rates of the tip with force and moment on it into out (6, 6), and the unknowns' into the first rows of
+    ``bench.rows``."""
+    explicit, answered = bench.moved[EXPLICIT], bench.moved[ANSWERED]
+    none, wrench = bench.lines[NONE], bench.lines[WRENCH]
+    N = len(bench.offset)
+    for p in range(6):
+        for i in range(6):
+            wrench[i] = 1.0 if i == p else 0.0
+        explicit_rates(
+            scene, bench, tubes, segments, rules, none[:N], none[:N], wrench[:6], none, bench.ends, explicit,
+            bench.rows[6],
+        )  # fmt: skip
+        answer_rates(scene, bench, bench.rows[6], scene.vectors[STEP])
+        answered_ends(scene, answered)
+        tip_rates(
+            scene, bench, tubes, rules, scene.counts[LEADER], none[:N], bench.ends, explicit, answered, out[p]
+        )  # fmt: skip
+        for u in range(scene.counts[N_UNKNOWNS]):
+            bench.rows[p, u] = scene.vectors[STEP, u]
 
 
 @compiled
-def along_element(
-    scene: Scene, bench: Bench, tubes: Array, rules: Array, m: int, D_rate: Array, ends: Array, angles: Array,
-    answered: Array, out: Array,
+def command_rates(
+    scene: Scene, bench: Bench, tubes: Array, segments: Ints, rules: Array, twists: bool, out: Array, gain: Array,
+    actuation: Array,
 ) -> None:  # fmt: skip
-    """Adds what the Gauss points of element m contribute to the tip's rates."""
-    G, h = scene.marks[m, GAUSS], scene.line[m, LENGTH]
-    stretch = ends[m + 1] - ends[m]
-    angles_inside(scene, rules, m, answered[m], scene.vectors[STEP], scene.turns[BEFORE])
-    for g in range(G):
-        row = scene.marks[m, ROW] + g
-        along = ends[m] + rules[G, g, PLACE] * stretch
-        dk = 0j
-        for j in range(len(D_rate)):
-            turned = scene.turns[BEFORE, row, j] + explicit_angle(scene, m, row, j, angles, stretch / h)
-            dk += moment_rate(scene, tubes, m, row, j, along + D_rate[j], turned)
-        change = (
-            scene.gauss[row, WEIGHT] * dk / scene.line[m, STIFFNESS]
-            + rules[G, g, WEIGHT] * stretch * scene.bends[row, BEND]
-        )
-        a, b = scene.bends[row, SPINOR], scene.bends[row, SPINOR + 1]
-        x, yz = position_inside(scene, rules, m, g)
-        move_tip(scene, bench, m, a, b, x, yz, change, rules[G, g, WEIGHT] * stretch, out)
+    """Rates of the tip with alpha and D into the first rows of out (2 N, 6), and of psi at the ends with alpha into
+    gain (N, N); under load those of torques and forces with what acts on the tip into actuation (2 N, 6)."""
+    N, M, leader = len(bench.offset), scene.counts[N_ELEMENTS], scene.counts[LEADER]
+    reciprocal = scene.counts[MOMENTS] == 0 and M > 0 and scene.marks[M - 1, LOADED] == 1
+    alpha_rate, D_rate, none = bench.lines[ALPHA_RATE], bench.lines[D_RATE], bench.lines[NONE]
+    ends, explicit, answered, rates = bench.ends, bench.moved[EXPLICIT], bench.moved[ANSWERED], bench.rows[6]
+    for p in range(2 * N):
+        for j in range(N):
+            alpha_rate[j] = 1.0 if p == j else 0.0
+            D_rate[j] = 1.0 if p == N + j else 0.0
+        explicit_rates(
+            scene, bench, tubes, segments, rules, alpha_rate[:N], D_rate[:N], none[:6], bench.lines[TORQUES], ends,
+            explicit, rates,
+        )  # fmt: skip
+        for u in range(scene.counts[N_UNKNOWNS]):
+            scene.vectors[STEP, u] = 0.0
+        if scene.counts[LEAD] > 0:
+            answered_ends(scene, answered)
+            tip_rates(scene, bench, tubes, rules, leader, D_rate[:N], ends, explicit, answered, out[p])
+            for i in range(6):
+                actuation[p, i] = work_rate(scene, bench, i, rates, explicit) - out[p, i]
+                if reciprocal:
+                    out[p, i] = -actuation[p, i]  # forces have a potential, and bending is free up to the tip
+        if reciprocal and p >= N:
+            continue
+        if twists:
+            answer_rates(scene, bench, rates, scene.vectors[STEP])
+        answered_ends(scene, answered)
+        if not reciprocal:
+            tip_rates(scene, bench, tubes, rules, leader, D_rate[:N], ends, explicit, answered, out[p])
+        if p < N:
+            for j in range(N):
+                gain[j, p] = explicit[M, j] + answered[M, j]
 
 
 @compiled
-def position_inside(scene: Scene, rules: Array, m: int, g: int) -> tuple[float, complex]:
-    """Way along x and y + i z [m] from the start of element m, in its frame, to Gauss point g."""
-    G, row, h = scene.marks[m, GAUSS], scene.marks[m, ROW], scene.line[m, LENGTH]
-    x, yz = 0.0, 0j
-    for k in range(G):
-        w = h * rules[G, g, INTERPOLANT + k]
-        a, b = scene.bends[row + k, SPINOR], scene.bends[row + k, SPINOR + 1]
-        x += w * (a.real * a.real + a.imag * a.imag - b.real * b.real - b.imag * b.imag)
-        yz -= 2j * w * a * b
-    return x, yz
-
-
-@compiled
-def along_arc(
-    scene: Scene, bench: Bench, tubes: Array, rules: Array, m: int, D_rate: Array, ends: Array, angles: Array,
-    answered: Array, out: Array,
-) -> None:  # fmt: skip
-    """Adds what an arc contributes to the tip's rates: frames in closed form at Gauss points of its own."""
-    h, stretch = scene.line[m, LENGTH], ends[m + 1] - ends[m]
-    turn = arc_turn(scene, tubes, m)
-    start = arc_start(scene, tubes, rules, m, turn)
-    G = nodes_for_turn((abs(start) + abs(turn)) * h + 1.0, ARC_ERROR)
-    curved, own_turn = -1, 0.0
-    for j in range(len(D_rate)):
-        i = scene.parts[SEGMENT, m, j]
-        if i != ABSENT and abs(pre_curvature(tubes, j, i, scene.line[m, ARC] + scene.base[AT, j])) > 0.0:
-            curved, own_turn = j, float(tubes[j, i, TURN])
-    for g in range(G):
-        x = rules[G, g, PLACE]
-        k = start * complex(math.cos(turn * h * x), math.sin(turn * h * x))
-        change = rules[G, g, WEIGHT] * stretch * k
-        if curved >= 0:
-            first = angles[m, curved] + answered[m, curved]
-            last = angles[m + 1, curved] + answered[m + 1, curved]
-            slide = ends[m] + x * stretch + D_rate[curved]
-            change += 1j * h * rules[G, g, WEIGHT] * k * (first + x * (last - first) + own_turn * slide)
-        a, b, along, across = arc(start, turn, x * h)
-        move_tip(scene, bench, m, a, b, along, across, change, rules[G, g, WEIGHT] * stretch, out)
-
-
-@compiled
-def move_tip(
-    scene: Scene, bench: Bench, m: int, a: complex, b: complex, x: float, yz: complex, change: complex, push: float,
-    out: Array,
-) -> None:  # fmt: skip
-    """Adds to the tip's rates a turn by ``change`` [rad], k_y + i k_z in the frame (a, b) at the place (x, yz) [m]
-    since the start of element m, and a ``push`` [m] along the tangent there."""
-    arm, turning, moved = bench.space[0], bench.space[1], bench.space[2]
-    A, B = scene.frame[m, 0], scene.frame[m, 1]
-    x, yz = turned_vector(A, B, x, yz)
-    last = scene.counts[N_ELEMENTS]
-    arm[0] = scene.line[last, POSITION] - scene.line[m, POSITION] - x
-    arm[1] = scene.line[last, POSITION + 1] - scene.line[m, POSITION + 1] - yz.real
-    arm[2] = scene.line[last, POSITION + 2] - scene.line[m, POSITION + 2] - yz.imag
-    a, b = A * a - B * b.conjugate(), A * b + B * a.conjugate()
-    x, yz = turned_vector(a, b, 0.0, change)
-    turning[0], turning[1], turning[2] = x, yz.real, yz.imag
-    cross(turning, arm, moved)
-    x, yz = turned_vector(a, b, push, 0j)
-    out[0] += moved[0] + x
-    out[1] += moved[1] + yz.real
-    out[2] += moved[2] + yz.imag
-    for i in range(3):
-        out[3 + i] += turning[i]
+def work_rate(scene: Scene, bench: Bench, i: int, rates: Array, explicit: Array) -> float:
+    """How the answer to component i of the tip's wrench changes the actuation load along a command: what is unbalanced
+    there, ``rates`` (U,), times that answer; point moments add their work on the turn that both make, which depends on
+    their order."""
+    total = 0.0
+    for u in range(scene.counts[N_UNKNOWNS]):
+        total += bench.rows[i, u] * rates[u]
+    if scene.counts[MOMENTS] == 0:
+        return total
+    N, turns = len(bench.offset), bench.rates
+    axis, w, moved = bench.space[0], bench.space[1], bench.space[2]
+    turns_at_ends(scene, bench, FINE, bench.rows[i], bench.lines[NONE], turns)
+    first = scene.counts[N_LOADS] - POINT * scene.counts[N_POINTS]
+    for p in range(scene.counts[N_POINTS]):
+        at, load = scene.point_at[p], first + POINT * p
+        j = int(scene.loads[load + TUBE])
+        tangent(scene.frame, at, axis)
+        for c in range(3):
+            w[c] = explicit[at, N + c] + axis[c] * explicit[at, j]
+            axis[c] = turns[at, c] + axis[c] * turns[at, 3 + j]
+        cross(axis, w, moved)
+        total -= dot(scene.loads[load + POINT_MOMENT : load + POINT], moved)
+    return total

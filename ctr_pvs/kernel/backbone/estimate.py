@@ -28,27 +28,14 @@ from ctr_pvs.kernel.arrays import STIFFNESS
 from ctr_pvs.kernel.arrays import TURNED
 from ctr_pvs.kernel.arrays import Array
 from ctr_pvs.kernel.arrays import Bench
-from ctr_pvs.kernel.arrays import Complex
 from ctr_pvs.kernel.arrays import Scene
+from ctr_pvs.kernel.backbone.frames import cross
+from ctr_pvs.kernel.backbone.frames import tangent
 from ctr_pvs.kernel.backbone.frames import turned_vector
 from ctr_pvs.kernel.compiler import compiled
 from ctr_pvs.kernel.materials import is_curved
-from ctr_pvs.kernel.twist.element import angles_inside
-
-
-@compiled
-def cross(u: Array, v: Array, out: Array) -> None:
-    """``out`` becomes u x v, (3,) each."""
-    out[0] = u[1] * v[2] - u[2] * v[1]
-    out[1] = u[2] * v[0] - u[0] * v[2]
-    out[2] = u[0] * v[1] - u[1] * v[0]
-
-
-@compiled
-def tangent(frame: Complex, m: int, out: Array) -> None:
-    """The tangent (3,) where element m starts."""
-    x, yz = turned_vector(frame[m, 0], frame[m, 1], 1.0, 0j)
-    out[0], out[1], out[2] = x, yz.real, yz.imag
+from ctr_pvs.kernel.twist.fields import angles_inside
+from ctr_pvs.kernel.twist.fields import mu_at
 
 
 @compiled
@@ -109,7 +96,7 @@ def through_coupled(scene: Scene, bench: Bench, rules: Array, m: int, change: Ar
         dk = 0j
         for j in range(len(bench.offset)):
             dk += scene.moments[TURNED, row, j] * scene.turns[PSI, row, j]
-        dk = 1j * dk / scene.line[m, STIFFNESS]
+        dk = (1j * dk + mu_at(scene, rules, m, g, change)) / scene.line[m, STIFFNESS]
         a, b = scene.bends[row, SPINOR], scene.bends[row, SPINOR + 1]
         a, b = A * a - B * b.conjugate(), A * b + B * a.conjugate()
         x, yz = turned_vector(a, b, 0.0, dk)

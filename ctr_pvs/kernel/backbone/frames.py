@@ -25,6 +25,8 @@ from ctr_pvs.kernel.arrays import FRAMED_ANGLE
 from ctr_pvs.kernel.arrays import GAUSS
 from ctr_pvs.kernel.arrays import INTERPOLANT
 from ctr_pvs.kernel.arrays import LENGTH
+from ctr_pvs.kernel.arrays import LOADED
+from ctr_pvs.kernel.arrays import MU_HERE
 from ctr_pvs.kernel.arrays import N_ELEMENTS
 from ctr_pvs.kernel.arrays import N_UNKNOWNS
 from ctr_pvs.kernel.arrays import PLACE
@@ -45,23 +47,30 @@ from ctr_pvs.kernel.arrays import Y
 from ctr_pvs.kernel.compiler import compiled
 from ctr_pvs.kernel.materials import is_constant
 from ctr_pvs.kernel.materials import is_curved
-from ctr_pvs.kernel.twist.element import angles_inside
-from ctr_pvs.kernel.twist.element import turn_moments
+from ctr_pvs.kernel.twist.fields import angles_inside
+from ctr_pvs.kernel.twist.fields import mu_at
+from ctr_pvs.kernel.twist.fields import turn_moments
 
-#: Rounds of the collocation equations, the most and what ends them: a change this small.
-MOST_ROUNDS, LAST_CHANGE = 60, 1e-15
+#: Rounds of the collocation equations, the most and what ends them: a change this small, as each round is at least a
+#: thousand times better than the one before by then.
+MOST_ROUNDS, LAST_CHANGE = 60, 1e-12
 
 
 @compiled
-def bend(scene: Scene, rules: Array, alpha: Array) -> None:
-    """Curvature at all Gauss points of ``scene`` for its ``y`` and ``angle``: eq. (26) point by point."""
+def bend(scene: Scene, rules: Array) -> None:
+    """Curvature at all Gauss points of ``scene`` for its ``y`` and ``angle``: eq. (26) point by point, and what the
+    loads add."""
     scene.base[FRAMED_ANGLE, 0] = math.nan
     for m in range(scene.counts[N_ELEMENTS]):
         angles_inside(scene, rules, m, scene.held[ANGLE, m], scene.vectors[Y], scene.turns[PSI])
         turn_moments(scene, m)
-        for row in range(scene.marks[m, ROW], scene.marks[m, ROW] + scene.marks[m, GAUSS]):
+        for g in range(scene.marks[m, GAUSS]):
+            row = scene.marks[m, ROW] + g
             total = 0j
-            for j in range(len(alpha)):
+            if scene.marks[m, LOADED]:
+                total = mu_at(scene, rules, m, g, scene.vectors[Y])
+                scene.bends[row, MU_HERE] = total
+            for j in range(scene.base.shape[1]):
                 total += scene.moments[TURNED, row, j]
             scene.bends[row, BEND] = total / scene.line[m, STIFFNESS]
 
@@ -117,19 +126,20 @@ def collocate(scene: Scene, rules: Array, m: int) -> tuple[complex, complex, flo
     for _ in range(MOST_ROUNDS):
         change = 0.0
         for g in range(G):
+            scene.bends[row + g, TRIAL] = 0.5 * h * (scene.bends[row + g, BEND] * spinor[row + g, 0])
+        for g in range(G):
             b = 0j
             for j in range(G):
-                b += rules[G, g, INTERPOLANT + j] * (scene.bends[row + j, BEND] * spinor[row + j, 0])
-            spinor[row + g, 1] = 0.5 * h * b
+                b += rules[G, g, INTERPOLANT + j] * scene.bends[row + j, TRIAL]
+            spinor[row + g, 1] = b
         for g in range(G):
-            a = 0j
+            scene.bends[row + g, TRIAL] = 0.5 * h * (scene.bends[row + g, BEND].conjugate() * spinor[row + g, 1])
+        for g in range(G):
+            a = 1.0 + 0j
             for j in range(G):
-                a += rules[G, g, INTERPOLANT + j] * (scene.bends[row + j, BEND].conjugate() * spinor[row + j, 1])
-            a = 1.0 - 0.5 * h * a
+                a -= rules[G, g, INTERPOLANT + j] * scene.bends[row + j, TRIAL]
             change = max(change, abs(a.real - spinor[row + g, 0].real) + abs(a.imag - spinor[row + g, 0].imag))
-            scene.bends[row + g, TRIAL] = a  # not in place: every point is to see the same round
-        for g in range(G):
-            spinor[row + g, 0] = scene.bends[row + g, TRIAL]
+            spinor[row + g, 0] = a
         if change < LAST_CHANGE:
             break
     a, b, along, across = 1.0 + 0j, 0j, 0.0, 0j
@@ -212,3 +222,24 @@ def put_pose(A: complex, B: complex, roll: float, out: Array) -> None:
     e = size * complex(math.cos(0.5 * roll), math.sin(0.5 * roll))
     a, b = A * e, B * e.conjugate()
     out[0], out[1], out[2], out[3] = a.imag, b.real, b.imag, a.real
+
+
+@compiled
+def cross(u: Array, v: Array, out: Array) -> None:
+    """``out`` becomes u x v, (3,) each."""
+    out[0] = u[1] * v[2] - u[2] * v[1]
+    out[1] = u[2] * v[0] - u[0] * v[2]
+    out[2] = u[0] * v[1] - u[1] * v[0]
+
+
+@compiled
+def tangent(frame: Complex, m: int, out: Array) -> None:
+    """The tangent (3,) where element m starts."""
+    x, yz = turned_vector(frame[m, 0], frame[m, 1], 1.0, 0j)
+    out[0], out[1], out[2] = x, yz.real, yz.imag
+
+
+@compiled
+def dot(u: Array, v: Array) -> float:
+    """u.v of the first three."""
+    return float(u[0] * v[0] + u[1] * v[1] + u[2] * v[2])

@@ -20,25 +20,41 @@ from ctr_pvs.kernel.arrays import FIRST
 from ctr_pvs.kernel.arrays import GAUSS
 from ctr_pvs.kernel.arrays import GRADIENT
 from ctr_pvs.kernel.arrays import INTEGRAL
+from ctr_pvs.kernel.arrays import LEAD
+from ctr_pvs.kernel.arrays import LOADED
+from ctr_pvs.kernel.arrays import MOMENT
+from ctr_pvs.kernel.arrays import MU_SIZE
 from ctr_pvs.kernel.arrays import N_ELEMENTS
+from ctr_pvs.kernel.arrays import N_LOADS
 from ctr_pvs.kernel.arrays import N_UNKNOWNS
 from ctr_pvs.kernel.arrays import PSI
 from ctr_pvs.kernel.arrays import PULL
-from ctr_pvs.kernel.arrays import REST
 from ctr_pvs.kernel.arrays import ROOT
 from ctr_pvs.kernel.arrays import ROW
 from ctr_pvs.kernel.arrays import SCALE
 from ctr_pvs.kernel.arrays import SIZE
+from ctr_pvs.kernel.arrays import SPRINGS
 from ctr_pvs.kernel.arrays import STIFFNESS
 from ctr_pvs.kernel.arrays import TORQUE
 from ctr_pvs.kernel.arrays import TURNED
 from ctr_pvs.kernel.arrays import WEIGHT
 from ctr_pvs.kernel.arrays import Array
-from ctr_pvs.kernel.arrays import Ints
+from ctr_pvs.kernel.arrays import Bench
 from ctr_pvs.kernel.arrays import Scene
 from ctr_pvs.kernel.arrays import Y
+from ctr_pvs.kernel.backbone.frames import bend
+from ctr_pvs.kernel.backbone.frames import chain
 from ctr_pvs.kernel.compiler import compiled
-from ctr_pvs.kernel.layout import FINER
+from ctr_pvs.kernel.loaded.hessian import load_hessian
+from ctr_pvs.kernel.loaded.statics import forces_work
+from ctr_pvs.kernel.loaded.statics import gather_moments
+from ctr_pvs.kernel.loaded.statics import spread_loads
+from ctr_pvs.kernel.loaded.statics import twist_by_moments
+from ctr_pvs.kernel.twist.fields import angles_inside
+from ctr_pvs.kernel.twist.fields import spread_angles
+from ctr_pvs.kernel.twist.fields import turn_moments
+from ctr_pvs.kernel.twist.fields import used
+from ctr_pvs.kernel.twist.fields import used_bending
 
 #: What stands for the cosines in a Hessian: themselves, their least value on the box that holds the angles ``before``
 #: and the present ones, or the least value there is.
@@ -50,55 +66,11 @@ SMALL_TURN = 1e-2
 
 
 @compiled
-def used(size: int, finer: int) -> int:
-    """How many of a tube's ``size`` unknowns in an element count: all of them at the finer degree."""
-    return size if finer or size < 2 else size - FINER
-
-
-@compiled
-def spread_angles(scene: Scene, alpha: Array, y: Array) -> None:
-    """Fills ``angle`` of ``scene``: psi at the elements' ends for base angles alpha (N,) [rad] and unknowns y.
-
-    Past its tip a tube keeps its last angle."""
-    N = len(alpha)
-    for j in range(N):
-        scene.held[ANGLE, 0, j] = alpha[j] + scene.base[ROOT, j] * y[j]
-    for m in range(scene.counts[N_ELEMENTS]):
-        for j in range(N):
-            turned = scene.held[SCALE, m, j] * y[scene.parts[FIRST, m, j]] if scene.parts[SIZE, m, j] > 0 else 0.0
-            scene.held[ANGLE, m + 1, j] = scene.held[ANGLE, m, j] + turned
-
-
-@compiled
-def angles_inside(scene: Scene, rules: Array, m: int, start: Array, y: Array, out: Array) -> None:
-    """Fills ``out`` (G, N) with psi at the Gauss points of element m, from that at its start (N,) and unknowns y."""
-    G = scene.marks[m, GAUSS]
-    for g in range(G):
-        row = scene.marks[m, ROW] + g
-        for j in range(out.shape[1]):
-            psi = 0.0
-            for k in range(scene.parts[SIZE, m, j]):
-                psi += y[scene.parts[FIRST, m, j] + k] * rules[G, g, INTEGRAL + k]
-            out[row, j] = start[j] + scene.held[SCALE, m, j] * psi
-
-
-@compiled
-def turn_moments(scene: Scene, m: int) -> None:
-    """Fills ``turned`` of element m from ``turn``."""
-    for row in range(scene.marks[m, ROW], scene.marks[m, ROW] + scene.marks[m, GAUSS]):
-        for j in range(scene.base.shape[1]):
-            b = scene.moments[REST, row, j]
-            if b != 0.0:
-                psi = scene.turns[PSI, row, j]
-                b = b * complex(math.cos(psi), math.sin(psi))
-            scene.moments[TURNED, row, j] = b
-
-
-@compiled
 def pull_tubes(scene: Scene, m: int) -> None:
-    """Fills ``pull`` (G, N) of element m: what bending pulls each tube's psi at the Gauss points [N m], eq. (35)."""
+    """Fills ``pull`` (G, N) of element m: what bending pulls each tube's psi at the Gauss points [N m], eq. (35), with
+    the moment of the loads: bending follows pointwise, k = (sum b_j + moment) / sum K."""
     for row in range(scene.marks[m, ROW], scene.marks[m, ROW] + scene.marks[m, GAUSS]):
-        total = 0j
+        total = scene.bends[row, MOMENT]
         for j in range(scene.base.shape[1]):
             total += scene.moments[TURNED, row, j]
         share = scene.gauss[row, WEIGHT] / scene.line[m, STIFFNESS]
@@ -109,12 +81,11 @@ def pull_tubes(scene: Scene, m: int) -> None:
 
 @compiled
 def gather(scene: Scene, rules: Array, out: Array) -> None:
-    """What ``pull`` at the Gauss points of the coupled elements means for the unknowns, sum pull dpsi / dy into ``out``
-    (U,), and for psi at the elements' ends: the sum of all beyond into ``torque``."""
+    """What ``pull`` at the Gauss points of the coupled elements means for the tubes' unknowns, sum pull dpsi / dy into
+    ``out`` (U,), and for psi at the elements' ends: the sum of all beyond into ``torque``.  That begins with what
+    stands in ``torque`` already: see ``clear_torques`` and ``twist_by_moments``."""
     N = scene.base.shape[1]
     M = scene.counts[N_ELEMENTS]
-    for j in range(N):
-        scene.held[TORQUE, M, j] = 0.0
     for m in range(M - 1, -1, -1):
         G = scene.marks[m, GAUSS]
         for j in range(N):
@@ -133,22 +104,38 @@ def gather(scene: Scene, rules: Array, out: Array) -> None:
                     out[first + k] *= scene.held[SCALE, m, j]
             if size > 0:
                 out[first] += scene.held[SCALE, m, j] * beyond
-            scene.held[TORQUE, m, j] = beyond + here
+            scene.held[TORQUE, m, j] += beyond + here
     for j in range(N):
         out[j] = scene.base[ROOT, j] * scene.held[TORQUE, 0, j]
 
 
 @compiled
-def energy_gradient(scene: Scene, rules: Array, alpha: Array) -> None:
-    """dE/dy of the whole robot at ``y`` and alpha (N,) [rad] into ``gradient``; turned moments and torques
-    stay in ``scene``."""
+def clear_torques(scene: Scene) -> None:
+    """No point of load twists anything."""
+    for m in range(scene.counts[N_ELEMENTS] + 1):
+        for j in range(scene.base.shape[1]):
+            scene.held[TORQUE, m, j] = 0.0
+
+
+@compiled
+def energy_gradient(scene: Scene, bench: Bench, tubes: Array, rules: Array, alpha: Array) -> None:
+    """dE/dy of the whole robot, less the loads' virtual work, at ``y`` and alpha (N,) [rad] into ``gradient``; turned
+    moments and torques stay in ``scene``, and under load frames and moments."""
     spread_angles(scene, alpha, scene.vectors[Y])
+    clear_torques(scene)
+    if scene.counts[N_LOADS] > 0:
+        bend(scene, rules)
+        chain(scene, tubes, rules)
+        spread_loads(scene, bench, rules)
+        twist_by_moments(scene)
     for m in range(scene.counts[N_ELEMENTS]):
         if scene.marks[m, COUPLED]:
-            angles_inside(scene, rules, m, scene.held[ANGLE, m], scene.vectors[Y], scene.turns[PSI])
-            turn_moments(scene, m)
+            if scene.counts[N_LOADS] == 0:
+                angles_inside(scene, rules, m, scene.held[ANGLE, m], scene.vectors[Y], scene.turns[PSI])
+                turn_moments(scene, m)
             pull_tubes(scene, m)
     gather(scene, rules, scene.vectors[GRADIENT])
+    gather_moments(scene, rules, MOMENT, scene.vectors[GRADIENT])
     for u in range(scene.counts[N_UNKNOWNS]):
         scene.vectors[GRADIENT, u] += scene.vectors[Y, u]
 
@@ -177,107 +164,107 @@ def spring(b: complex, c: complex, moved: float, slack: float, kind: int) -> flo
 
 @compiled
 def element_hessian(
-    scene: Scene,
-    rules: Array,
-    m: int,
-    finer: int,
-    kind: int,
-    slack: float,
-    offset: Ints,
-    H: Array,
-    X: Array,
-    near: Array,
-) -> int:
-    """Adds the bending part of element m's second derivative; n, the unknowns it counts.
+    scene: Scene, bench: Bench, rules: Array, m: int, which: int, kind: int, slack: float, A: Array
+) -> int:  # fmt: skip
+    """Adds the bending part of element m's second derivative to the lower triangle of A (n + S, n + S); n, the unknowns
+    it counts.
 
-    H (n, n) : along its unknowns, lower triangle; X (N, n) : between psi at its start and its unknowns; near (N, N) :
-    along psi at its start.  offset (N,) is filled with the first row of each tube.  kind, slack : see ``spring``.
+    Rows: the unknowns, tube by tube, then mu_y and mu_z; under load the turn of the frame at its start (3,); psi there
+    (N,).  ``bench.offset`` is filled with the first row of each tube.  kind, slack : see ``spring``.
     """
-    N = len(offset)
-    G = scene.marks[m, GAUSS]
+    N = len(bench.offset)
     n = 0
     for j in range(N):
-        offset[j] = n
-        n += used(scene.parts[SIZE, m, j], finer)
+        bench.offset[j] = n
+        n += used(scene.parts[SIZE, m, j], which)
+    n += 2 * used_bending(scene.marks[m, MU_SIZE], which)
     if not scene.marks[m, COUPLED]:
         return n
+    G, start = scene.marks[m, GAUSS], n + scene.counts[LEAD]
+    stiff = bench.squares[SPRINGS]
     for g in range(G):
-        row = scene.marks[m, ROW] + g
-        share = scene.gauss[row, WEIGHT] / scene.line[m, STIFFNESS]
+        springs(scene, m, g, kind, slack, stiff)
         for i in range(N):
             if scene.parts[SIZE, m, i] < 2:
                 continue
-            for j in range(i):
-                if scene.parts[SIZE, m, j] < 2:
-                    continue
-                moved = 0.0
-                if kind == LOWERED:
-                    moved = (
-                        scene.turns[PSI, row, i]
-                        - scene.turns[BEFORE, row, i]
-                        - scene.turns[PSI, row, j]
-                        + scene.turns[BEFORE, row, j]
-                    )
-                c = share * spring(scene.moments[TURNED, row, j], scene.moments[TURNED, row, i], moved, slack, kind)
-                near[i, i] += c
-                near[j, j] += c
-                near[i, j] -= c
-                near[j, i] -= c
-                add_spring(scene, rules, m, G, g, i, j, c, finer, offset, H, X)
+            for j in range(N):
+                if scene.parts[SIZE, m, j] > 1:
+                    add_spring(scene, bench, rules, m, g, i, j, stiff[i, j], which, start, A)
+    if scene.marks[m, LOADED]:
+        load_hessian(scene, bench, rules, m, which, n, A)
     return n
 
 
 @compiled
-def add_spring(
-    scene: Scene,
-    rules: Array,
-    m: int,
-    G: int,
-    g: int,
-    i: int,
-    j: int,
-    c: float,
-    finer: int,
-    offset: Ints,
-    H: Array,
-    X: Array,
-) -> None:
-    """Adds a spring of stiffness c [N m] between tubes i > j at Gauss point g of element m to H and X."""
-    ni, nj = used(scene.parts[SIZE, m, i], finer), used(scene.parts[SIZE, m, j], finer)
-    oi, oj = offset[i], offset[j]
-    si, sj = scene.held[SCALE, m, i], scene.held[SCALE, m, j]
-    for k in range(ni):
-        a = c * si * rules[G, g, INTEGRAL + k]
-        X[i, oi + k] += a
-        X[j, oi + k] -= a
-        for r in range(k + 1):
-            H[oi + k, oi + r] += a * si * rules[G, g, INTEGRAL + r]
-        for r in range(nj):
-            H[oi + k, oj + r] -= a * sj * rules[G, g, INTEGRAL + r]
-    for k in range(nj):
-        a = c * sj * rules[G, g, INTEGRAL + k]
-        X[j, oj + k] += a
-        X[i, oj + k] -= a
-        for r in range(k + 1):
-            H[oj + k, oj + r] += a * sj * rules[G, g, INTEGRAL + r]
+def springs(scene: Scene, m: int, g: int, kind: int, slack: float, out: Array) -> None:
+    """Second derivatives of the bending energy along psi at Gauss point g of element m into ``out`` (N, N) [N m]:
+    springs between every two tubes, and to the moment of the loads."""
+    N, row = scene.base.shape[1], scene.marks[m, ROW] + g
+    share = scene.gauss[row, WEIGHT] / scene.line[m, STIFFNESS]
+    moment = scene.bends[row, MOMENT]
+    for i in range(N):
+        b = scene.moments[TURNED, row, i]
+        out[i, i] = share * (moment.real * b.real + moment.imag * b.imag)
+    for i in range(N):
+        for j in range(i):
+            if scene.parts[SIZE, m, i] < 2 or scene.parts[SIZE, m, j] < 2:
+                continue
+            moved = 0.0
+            if kind == LOWERED:
+                moved = (
+                    scene.turns[PSI, row, i]
+                    - scene.turns[BEFORE, row, i]
+                    - scene.turns[PSI, row, j]
+                    + scene.turns[BEFORE, row, j]
+                )
+            c = share * spring(scene.moments[TURNED, row, j], scene.moments[TURNED, row, i], moved, slack, kind)
+            out[i, i] += c
+            out[j, j] += c
+            out[i, j] = -c
+            out[j, i] = -c
 
 
 @compiled
-def energy_value(scene: Scene, rules: Array, alpha: Array) -> float:
-    """The part of the energy [J] that depends on ``y``, at alpha (N,) [rad]."""
+def add_spring(
+    scene: Scene, bench: Bench, rules: Array, m: int, g: int, i: int, j: int, c: float, which: int, start: int, A: Array
+) -> None:
+    """Adds c dpsi_i dpsi_j [N m] at Gauss point g of element m to the lower triangle of A; psi at the element's start
+    begins at the row ``start``."""
+    G = scene.marks[m, GAUSS]
+    ni, nj = used(scene.parts[SIZE, m, i], which), used(scene.parts[SIZE, m, j], which)
+    oi, oj = bench.offset[i], bench.offset[j]
+    si, sj = c * scene.held[SCALE, m, i], scene.held[SCALE, m, j]
+    if i >= j:
+        for k in range(ni):
+            a = si * rules[G, g, INTEGRAL + k] * sj
+            for r in range(k + 1 if i == j else nj):
+                A[oi + k, oj + r] += a * rules[G, g, INTEGRAL + r]
+        A[start + i, start + j] += c
+    for r in range(nj):
+        A[start + i, oj + r] += c * sj * rules[G, g, INTEGRAL + r]
+
+
+@compiled
+def energy_value(scene: Scene, tubes: Array, rules: Array, alpha: Array) -> float:
+    """The part of the energy [J] that depends on ``y``, at alpha (N,) [rad], less the work of the loads' forces."""
+    loaded = scene.counts[N_LOADS] > 0
     spread_angles(scene, alpha, scene.vectors[Y])
+    if loaded:
+        bend(scene, rules)
+        chain(scene, tubes, rules)
     value = 0.0
     for u in range(scene.counts[N_UNKNOWNS]):
         value += 0.5 * scene.vectors[Y, u] * scene.vectors[Y, u]
     for m in range(scene.counts[N_ELEMENTS]):
         if not scene.marks[m, COUPLED]:
             continue
-        angles_inside(scene, rules, m, scene.held[ANGLE, m], scene.vectors[Y], scene.turns[PSI])
-        turn_moments(scene, m)
+        if not loaded:
+            angles_inside(scene, rules, m, scene.held[ANGLE, m], scene.vectors[Y], scene.turns[PSI])
+            turn_moments(scene, m)
         for row in range(scene.marks[m, ROW], scene.marks[m, ROW] + scene.marks[m, GAUSS]):
             total = 0j
             for j in range(len(alpha)):
                 total += scene.moments[TURNED, row, j]
             size = total.real * total.real + total.imag * total.imag
             value -= 0.5 * scene.gauss[row, WEIGHT] * size / scene.line[m, STIFFNESS]
-    return value
+    return value - forces_work(scene) if loaded else value

@@ -22,6 +22,7 @@ from ctr_pvs.kernel.twist.condensation import substitute
 from ctr_pvs.kernel.twist.element import EXACT
 from ctr_pvs.kernel.twist.element import energy_gradient
 from ctr_pvs.kernel.twist.element import energy_value
+from ctr_pvs.kernel.twist.fields import COARSE
 from ctr_pvs.kernel.twist.newton import correct
 from ctr_pvs.kernel.twist.newton import twist_size
 
@@ -38,27 +39,27 @@ FIRST_SHIFT, ROUNDS = 1e-8, 4
 
 
 @compiled
-def soften(scene: Scene, bench: Bench, rules: Array, alpha: Array) -> None:
+def soften(scene: Scene, bench: Bench, tubes: Array, rules: Array, alpha: Array) -> None:
     """The direction that has lost its stiffness at ``y`` and alpha (N,) into ``other``, of a twist of
     NUDGE, to the side where the energy is lower."""
-    energy_gradient(scene, rules, alpha)
+    energy_gradient(scene, bench, tubes, rules, alpha)
     shift = FIRST_SHIFT
-    while not factorize(scene, bench, rules, 0, EXACT, 0.0, shift, -1.0):
+    while not factorize(scene, bench, rules, COARSE, EXACT, 0.0, shift, -1.0):
         shift *= 4.0
     U = scene.counts[N_UNKNOWNS]
     for u in range(U):
         scene.vectors[OTHER, u] = 1.0 + 0.1 * (u % 7)
     for _ in range(ROUNDS):
-        substitute(scene, bench, 0, scene.vectors[OTHER], bench.lines[NONE], scene.vectors[STEP], False)
-        size = max(twist_size(scene, scene.vectors[STEP], 0), 1e-300)
+        substitute(scene, bench, COARSE, scene.vectors[OTHER], bench.lines[NONE], scene.vectors[STEP], False)
+        size = max(twist_size(scene, scene.vectors[STEP], COARSE), 1e-300)
         for u in range(U):
             scene.vectors[OTHER, u] = scene.vectors[STEP, u] * NUDGE / size
     for u in range(U):
         scene.vectors[Y, u] += scene.vectors[OTHER, u]
-    ahead = energy_value(scene, rules, alpha)
+    ahead = energy_value(scene, tubes, rules, alpha)
     for u in range(U):
         scene.vectors[Y, u] -= 2.0 * scene.vectors[OTHER, u]
-    behind = energy_value(scene, rules, alpha)
+    behind = energy_value(scene, tubes, rules, alpha)
     for u in range(U):
         scene.vectors[Y, u] += scene.vectors[OTHER, u]
         if behind < ahead:
@@ -66,22 +67,22 @@ def soften(scene: Scene, bench: Bench, rules: Array, alpha: Array) -> None:
 
 
 @compiled
-def euler_step(scene: Scene, bench: Bench, rules: Array, alpha: Array, time: float, out: Array) -> bool:
+def euler_step(scene: Scene, bench: Bench, tubes: Array, rules: Array, alpha: Array, time: float, out: Array) -> bool:
     """One linearly implicit Euler step of the flow from ``y`` into ``out`` (U,); false if ``time`` is too
     long."""
-    energy_gradient(scene, rules, alpha)
-    if not factorize(scene, bench, rules, 0, EXACT, 0.0, 1.0 / time, -1.0):
+    energy_gradient(scene, bench, tubes, rules, alpha)
+    if not factorize(scene, bench, rules, COARSE, EXACT, 0.0, 1.0 / time, -1.0):
         return False
     for u in range(scene.counts[N_UNKNOWNS]):
         scene.vectors[OTHER, u] = -scene.vectors[GRADIENT, u]
-    substitute(scene, bench, 0, scene.vectors[OTHER], bench.lines[NONE], scene.vectors[STEP], False)
+    substitute(scene, bench, COARSE, scene.vectors[OTHER], bench.lines[NONE], scene.vectors[STEP], False)
     for u in range(scene.counts[N_UNKNOWNS]):
         out[u] = scene.vectors[Y, u] + scene.vectors[STEP, u]
     return True
 
 
 @compiled
-def flow(scene: Scene, bench: Bench, rules: Array, alpha: Array, clock: Array, steps: int) -> int:
+def flow(scene: Scene, bench: Bench, tubes: Array, rules: Array, alpha: Array, clock: Array, steps: int) -> int:
     """Follows the gradient flow from ``y`` at alpha (N,) for at most ``steps`` steps: 1 at a stable equilibrium,
     0 if there is more to go, -1 if it does not come to rest.
 
@@ -90,31 +91,31 @@ def flow(scene: Scene, bench: Bench, rules: Array, alpha: Array, clock: Array, s
     U = scene.counts[N_UNKNOWNS]
     start, whole, half = bench.rows[0], bench.rows[1], bench.rows[2]
     for _ in range(steps):
-        energy_gradient(scene, rules, alpha)
-        if twist_size(scene, scene.vectors[GRADIENT], 0) < clock[2]:
+        energy_gradient(scene, bench, tubes, rules, alpha)
+        if twist_size(scene, scene.vectors[GRADIENT], COARSE) < clock[2]:
             for u in range(U):
                 start[u] = scene.vectors[Y, u]
-            if correct(scene, bench, rules, alpha, 0, False) > 0:
+            if correct(scene, bench, tubes, rules, alpha, COARSE, False, 0.0) > 0:
                 for u in range(U):
                     whole[u] = scene.vectors[Y, u] - start[u]
-                if twist_size(scene, whole, 0) < LAST_WAY:
+                if twist_size(scene, whole, COARSE) < LAST_WAY:
                     return 1
             for u in range(U):
                 scene.vectors[Y, u] = start[u]
             clock[2] *= 0.1  # still drifting: wait until it is quieter before trying again
         for u in range(U):
             start[u] = scene.vectors[Y, u]
-        good = euler_step(scene, bench, rules, alpha, clock[1], whole)
-        good = good and euler_step(scene, bench, rules, alpha, 0.5 * clock[1], half)
+        good = euler_step(scene, bench, tubes, rules, alpha, clock[1], whole)
+        good = good and euler_step(scene, bench, tubes, rules, alpha, 0.5 * clock[1], half)
         if good:
             for u in range(U):
                 scene.vectors[Y, u] = half[u]
-            good = euler_step(scene, bench, rules, alpha, 0.5 * clock[1], half)
+            good = euler_step(scene, bench, tubes, rules, alpha, 0.5 * clock[1], half)
         error = 1e300
         if good:
             for u in range(U):
                 whole[u] = half[u] - whole[u]
-            error = twist_size(scene, whole, 0)
+            error = twist_size(scene, whole, COARSE)
         if error > FLOW_ERROR:
             for u in range(U):
                 scene.vectors[Y, u] = start[u]

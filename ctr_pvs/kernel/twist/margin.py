@@ -10,9 +10,14 @@ import math
 
 from ctr_pvs.kernel.arrays import COUPLED
 from ctr_pvs.kernel.arrays import GAUSS
+from ctr_pvs.kernel.arrays import LEAD
+from ctr_pvs.kernel.arrays import MU
+from ctr_pvs.kernel.arrays import MU_SIZE
 from ctr_pvs.kernel.arrays import N_ELEMENTS
+from ctr_pvs.kernel.arrays import N_LOADS
 from ctr_pvs.kernel.arrays import N_UNKNOWNS
 from ctr_pvs.kernel.arrays import NONE
+from ctr_pvs.kernel.arrays import OTHER
 from ctr_pvs.kernel.arrays import ROW
 from ctr_pvs.kernel.arrays import ROWS
 from ctr_pvs.kernel.arrays import STEP
@@ -25,6 +30,8 @@ from ctr_pvs.kernel.twist.condensation import factorize
 from ctr_pvs.kernel.twist.condensation import substitute
 from ctr_pvs.kernel.twist.element import EXACT
 from ctr_pvs.kernel.twist.element import energy_gradient
+from ctr_pvs.kernel.twist.fields import BENDING_ONLY
+from ctr_pvs.kernel.twist.fields import FINE
 
 #: Most Lanczos vectors, and the relative change of the largest Ritz value that ends it.
 MOST_VECTORS, SETTLED = ROWS - 2, 1e-13
@@ -34,8 +41,11 @@ BREAKDOWN = 1e-12
 
 @compiled
 def all_attract(scene: Scene) -> bool:
-    """True if no two tubes push each other anywhere: then the margin is 1 without a look at the Hessian."""
+    """True if no load acts and no two tubes push each other anywhere: then the margin is 1 without a look at the
+    Hessian."""
     N = scene.base.shape[1]
+    if scene.counts[N_LOADS] > 0:
+        return False
     for m in range(scene.counts[N_ELEMENTS]):
         if not scene.marks[m, COUPLED]:
             continue
@@ -48,32 +58,62 @@ def all_attract(scene: Scene) -> bool:
 
 
 @compiled
-def stability_margin(scene: Scene, bench: Bench, rules: Array, alpha: Array) -> float:
+def stability_margin(scene: Scene, bench: Bench, tubes: Array, rules: Array, alpha: Array) -> float:
     """The margin of ``y`` at alpha (N,) [rad] and the finer degree, clipped at 1; -1 if it is not positive.
 
-    By Lanczos on the inverse of the Hessian, from a fixed start.
+    Under load bending may lose its stiffness too: the margin is the smaller one of that of bending alone, with psi held
+    and relative to bending stiffness, and that of psi, bending eliminated.
     """
-    energy_gradient(scene, rules, alpha)
+    energy_gradient(scene, bench, tubes, rules, alpha)
     if all_attract(scene):
         return 1.0
-    if not factorize(scene, bench, rules, 1, EXACT, 0.0, 0.0, -1.0):
-        return -1.0
+    margin = 1.0
+    for which in (BENDING_ONLY, FINE):
+        if which == BENDING_ONLY and scene.counts[LEAD] == 0:
+            continue
+        if not factorize(scene, bench, rules, which, EXACT, 0.0, 0.0, -1.0):
+            return -1.0
+        largest = largest_compliance(scene, bench, which)
+        margin = min(margin, 1.0 / largest if largest > 1.0 else 1.0)
+    return margin
+
+
+@compiled
+def mark_unknowns(scene: Scene, which: int, out: Array) -> int:
+    """1 into ``out`` (U,) for the unknowns whose margin is asked for, of mu or of psi, else 0; how many they are."""
+    for u in range(scene.counts[N_UNKNOWNS]):
+        out[u] = 0.0 if which == BENDING_ONLY else 1.0
+    for m in range(scene.counts[N_ELEMENTS]):
+        for k in range(2 * scene.marks[m, MU_SIZE]):
+            out[scene.marks[m, MU] + k] = 1.0 if which == BENDING_ONLY else 0.0
+    count = 0
+    for u in range(scene.counts[N_UNKNOWNS]):
+        count += 1 if out[u] > 0.0 else 0
+    return count
+
+
+@compiled
+def largest_compliance(scene: Scene, bench: Bench, which: int) -> float:
+    """The largest eigenvalue of the inverse of the factorised Hessian on the unknowns of ``mark_unknowns``, by Lanczos
+    from a fixed start; others adapt."""
     U = scene.counts[N_UNKNOWNS]
     vectors = bench.rows
-    v = vectors[0]
+    v, marked = vectors[0], scene.vectors[OTHER]
+    most = min(MOST_VECTORS, mark_unknowns(scene, which, marked))
     size = 0.0
     for u in range(U):
-        v[u] = 1.0 + 0.5 * math.sin(1.7 * u)  # a mixed start: no symmetry of a robot is orthogonal to it
+        v[u] = marked[u] * (1.0 + 0.5 * math.sin(1.7 * u))  # a mixed start: no symmetry of a robot is orthogonal to it
         size += v[u] * v[u]
     for u in range(U):
-        v[u] /= math.sqrt(size)
+        v[u] /= max(math.sqrt(size), 1e-300)
     diagonal, side = vectors[MOST_VECTORS], vectors[MOST_VECTORS + 1]
     largest, count = 0.0, 0
-    for k in range(min(MOST_VECTORS, U)):
+    for k in range(most):
         w = scene.vectors[STEP]
-        substitute(scene, bench, 1, vectors[k], bench.lines[NONE], w, False)
+        substitute(scene, bench, which, vectors[k], bench.lines[NONE], w, False)
         dot = 0.0
         for u in range(U):
+            w[u] *= marked[u]
             dot += vectors[k, u] * w[u]
         diagonal[k] = dot
         count = k + 1
@@ -92,11 +132,11 @@ def stability_margin(scene: Scene, bench: Bench, rules: Array, alpha: Array) -> 
         largest = largest_eigenvalue(diagonal, side, count)
         if size < BREAKDOWN * largest or largest - previous <= SETTLED * largest:
             break
-        if k + 1 < min(MOST_VECTORS, U):
+        if k + 1 < most:
             side[k] = size
             for u in range(U):
                 vectors[k + 1, u] = w[u] / size
-    return min(1.0, 1.0 / largest)
+    return largest
 
 
 @compiled

@@ -16,8 +16,13 @@ from ctr_pvs.kernel.arrays import COUPLED
 from ctr_pvs.kernel.arrays import FIRST
 from ctr_pvs.kernel.arrays import GAUSS
 from ctr_pvs.kernel.arrays import GRADIENT
-from ctr_pvs.kernel.arrays import LAST_COUPLED
+from ctr_pvs.kernel.arrays import LAST_ACTIVE
+from ctr_pvs.kernel.arrays import LEAD
+from ctr_pvs.kernel.arrays import LENGTH
+from ctr_pvs.kernel.arrays import MU
+from ctr_pvs.kernel.arrays import MU_SIZE
 from ctr_pvs.kernel.arrays import N_ELEMENTS
+from ctr_pvs.kernel.arrays import N_LOADS
 from ctr_pvs.kernel.arrays import N_UNKNOWNS
 from ctr_pvs.kernel.arrays import NONE
 from ctr_pvs.kernel.arrays import OTHER
@@ -27,28 +32,36 @@ from ctr_pvs.kernel.arrays import ROW
 from ctr_pvs.kernel.arrays import SCALE
 from ctr_pvs.kernel.arrays import SIZE
 from ctr_pvs.kernel.arrays import STEP
+from ctr_pvs.kernel.arrays import STIFFNESS
 from ctr_pvs.kernel.arrays import TURNED_BY
 from ctr_pvs.kernel.arrays import Array
 from ctr_pvs.kernel.arrays import Bench
 from ctr_pvs.kernel.arrays import Scene
 from ctr_pvs.kernel.arrays import Y
 from ctr_pvs.kernel.compiler import compiled
+from ctr_pvs.kernel.loaded.tangent import solve_tangent
 from ctr_pvs.kernel.twist.condensation import factorize
-from ctr_pvs.kernel.twist.condensation import substitute
 from ctr_pvs.kernel.twist.element import EXACT
 from ctr_pvs.kernel.twist.element import LOWERED
 from ctr_pvs.kernel.twist.element import WORST
-from ctr_pvs.kernel.twist.element import angles_inside
 from ctr_pvs.kernel.twist.element import energy_gradient
-from ctr_pvs.kernel.twist.element import spread_angles
-from ctr_pvs.kernel.twist.element import turn_moments
-from ctr_pvs.kernel.twist.element import used
+from ctr_pvs.kernel.twist.fields import COARSE
+from ctr_pvs.kernel.twist.fields import FINE
+from ctr_pvs.kernel.twist.fields import angles_inside
+from ctr_pvs.kernel.twist.fields import spread_angles
+from ctr_pvs.kernel.twist.fields import turn_moments
+from ctr_pvs.kernel.twist.fields import used
+from ctr_pvs.kernel.twist.fields import used_bending
 
 #: A Newton step shorter than this [rad] leaves about its square: time to look at the residual.
 LAST_STEP = 2e-6
 MOST_STEPS = 12
+#: Under load, after a Newton step shorter than this [rad] its factorisation serves again; and what is short then.
+CHORD, LAST_CHORD = 0.05, 1e-9
 #: A step that is not shorter than the one before by this factor is not Newton converging.
 CONTRACTION = 0.5
+#: Under load nothing proves that a step keeps its branch: its correction must be this much shorter than the tangent.
+LOADED_CONTRACTION = 0.25
 #: An equilibrium is accepted when its residual twist [rad] is below this, plus rounding of large base angles: cos and
 #: sin lose digits where those are many turns.
 RESIDUAL_TWIST, ANGLE_ROUNDING = 1e-11, 64.0 * 2.220446049250313e-16
@@ -57,22 +70,30 @@ SLACK, LEAST_SLACK, MOST_SLACK = 100.0, 1e-6, 0.05
 
 
 @compiled
-def twist_size(scene: Scene, v: Array, finer: int) -> float:
-    """A bound of the largest twist angle [rad] that the unknowns v (U,), a vector [sqrt(J)], stand for.
+def twist_size(scene: Scene, v: Array, which: int) -> float:
+    """A bound of the largest angle [rad], of twist or of how mu turns the frame, that the unknowns v (U,), a vector
+    [sqrt(J)], stand for.
 
     Inside an element sum_l v_l int_0^x P_l is at most the norm of v there: Bessel's inequality for 1 on [0, x]."""
     most = 0.0
     for j in range(scene.base.shape[1]):
         end = scene.base[ROOT, j] * v[j]
         most = max(most, abs(end))
-        for m in range(scene.counts[LAST_COUPLED]):
+        for m in range(scene.counts[LAST_ACTIVE]):
             if scene.parts[SIZE, m, j] > 0:
                 first, squares = scene.parts[FIRST, m, j], 0.0
-                for k in range(used(scene.parts[SIZE, m, j], finer)):
+                for k in range(used(scene.parts[SIZE, m, j], which)):
                     squares += v[first + k] * v[first + k]
                 most = max(most, abs(end) + scene.held[SCALE, m, j] * math.sqrt(squares))
                 end += scene.held[SCALE, m, j] * v[first]
-    return most
+    bent = 0.0
+    for m in range(scene.counts[LAST_ACTIVE] if scene.counts[LEAD] > 0 else 0):
+        first, squares = scene.marks[m, MU], 0.0
+        size, count = scene.marks[m, MU_SIZE], used_bending(scene.marks[m, MU_SIZE], which)
+        for k in range(count):
+            squares += v[first + k] * v[first + k] + v[first + size + k] * v[first + size + k]
+        bent += math.sqrt(squares * scene.line[m, LENGTH] / scene.line[m, STIFFNESS])
+    return max(most, bent)
 
 
 @compiled
@@ -93,43 +114,61 @@ def slack_of(scene: Scene, tolerance: float) -> float:
 
 @compiled
 def newton_step(
-    scene: Scene, bench: Bench, rules: Array, alpha: Array, turned: Array, finer: int, kind: int, slack: float
-) -> bool:
+    scene: Scene, bench: Bench, tubes: Array, rules: Array, alpha: Array, turned: Array, which: int, kind: int,
+    slack: float,
+) -> bool:  # fmt: skip
     """Newton's step at alpha (N,) and ``y`` into ``step``, while the base angles turn by ``turned`` (N,);
     false if the Hessian, or its bound by ``kind`` and ``slack``, is not positive definite."""
-    energy_gradient(scene, rules, alpha)
-    if not factorize(scene, bench, rules, finer, kind, slack, 0.0, -1.0):
+    energy_gradient(scene, bench, tubes, rules, alpha)
+    if not factorize(scene, bench, rules, which, kind, slack, 0.0, -1.0):
         return False
-    for u in range(scene.counts[N_UNKNOWNS]):
-        scene.vectors[OTHER, u] = -scene.vectors[GRADIENT, u]
-    substitute(scene, bench, finer, scene.vectors[OTHER], turned, scene.vectors[STEP], False)
+    chord_step(scene, bench, turned, which)
     return True
 
 
 @compiled
-def predict(scene: Scene, bench: Bench, rules: Array, before: Array, alpha: Array) -> None:
-    """Moves ``y``, an equilibrium at base angles ``before`` (N,), along the tangent to those at alpha (N,)."""
-    turned = bench.lines[TURNED_BY]
-    for j in range(len(alpha)):
-        turned[j] = alpha[j] - before[j]
-    if newton_step(scene, bench, rules, before, turned, 0, EXACT, 0.0):
-        for u in range(scene.counts[N_UNKNOWNS]):
-            scene.vectors[Y, u] += scene.vectors[STEP, u]
+def chord_step(scene: Scene, bench: Bench, turned: Array, which: int) -> None:
+    """The step from the present gradient with the last factorisation, into ``step``."""
+    for u in range(scene.counts[N_UNKNOWNS]):
+        scene.vectors[OTHER, u] = -scene.vectors[GRADIENT, u]
+    solve_tangent(scene, bench, which, scene.vectors[OTHER], turned, scene.vectors[STEP], 1.0)
 
 
 @compiled
-def correct(scene: Scene, bench: Bench, rules: Array, alpha: Array, finer: int, unique: bool) -> int:
+def predict(scene: Scene, bench: Bench, tubes: Array, rules: Array, before: Array, alpha: Array) -> float:
+    """Moves ``y``, an equilibrium at base angles ``before`` (N,), along the tangent to those at alpha (N,): a Newton
+    step, which under changed loads or D takes their change along.  How far [rad]; infinite if there is no tangent."""
+    turned = bench.lines[TURNED_BY]
+    for j in range(len(alpha)):
+        turned[j] = alpha[j] - before[j]
+    if not newton_step(scene, bench, tubes, rules, before, turned, COARSE, EXACT, 0.0):
+        return math.inf
+    for u in range(scene.counts[N_UNKNOWNS]):
+        scene.vectors[Y, u] += scene.vectors[STEP, u]
+    return twist_size(scene, scene.vectors[STEP], COARSE)
+
+
+@compiled
+def correct(
+    scene: Scene, bench: Bench, tubes: Array, rules: Array, alpha: Array, which: int, unique: bool, first: float
+) -> int:
     """Newton from ``y`` to the equilibrium at alpha (N,) [rad]; the steps it took, or minus them if it failed.
 
     It keeps to the basin it starts in: it stops rather than take a longer second step.  unique :
-    there is but one equilibrium; then steps are only kept from being too long.
+    there is but one equilibrium; then steps are only kept from being too long.  first : length [rad] of the step that
+    predicted ``y``, which the next one under load must not come near; 0 if none did.
     """
-    previous, steps = math.inf, 0
+    previous, steps, chord = math.inf, 0, False
+    if scene.counts[N_LOADS] > 0 and first > 0.0:
+        previous, steps, chord = LOADED_CONTRACTION / CONTRACTION * first, 1, first < CHORD
     while steps < MOST_STEPS * (4 if unique else 1):
-        if not newton_step(scene, bench, rules, alpha, bench.lines[NONE], finer, EXACT, 0.0):
+        if chord:
+            energy_gradient(scene, bench, tubes, rules, alpha)
+            chord_step(scene, bench, bench.lines[NONE], which)
+        elif not newton_step(scene, bench, tubes, rules, alpha, bench.lines[NONE], which, EXACT, 0.0):
             return -steps - 1
         steps += 1
-        size = twist_size(scene, scene.vectors[STEP], finer)
+        size = twist_size(scene, scene.vectors[STEP], which)
         share = 1.0
         if unique and size > 1.0:
             share = 1.0 / size
@@ -137,8 +176,10 @@ def correct(scene: Scene, bench: Bench, rules: Array, alpha: Array, finer: int, 
             return -steps
         for u in range(scene.counts[N_UNKNOWNS]):
             scene.vectors[Y, u] += share * scene.vectors[STEP, u]
-        if size <= LAST_STEP:
+        if size <= (LAST_CHORD if chord else LAST_STEP):
             return steps
+        # A factorisation costs three times a gradient under load; the last one serves while it is nearly that of here.
+        chord = scene.counts[N_LOADS] > 0 and size < CHORD
         previous = size
     return -steps
 
@@ -170,12 +211,12 @@ def largest_turn(scene: Scene) -> float:
 
 
 @compiled
-def certainly_convex(scene: Scene, bench: Bench, rules: Array, alpha: Array, reach: float) -> bool:
+def certainly_convex(scene: Scene, bench: Bench, tubes: Array, rules: Array, alpha: Array, reach: float) -> bool:
     """True if the energy is convex, at the finer degree, wherever angles between tubes are within ``reach`` [rad] of
     those of ``y`` at alpha (N,)."""
-    energy_gradient(scene, rules, alpha)
+    energy_gradient(scene, bench, tubes, rules, alpha)
     remember(scene, rules, alpha)
-    return factorize(scene, bench, rules, 1, LOWERED, reach, 0.0, -1.0)
+    return factorize(scene, bench, rules, FINE, LOWERED, reach, 0.0, -1.0)
 
 
 @compiled
@@ -185,4 +226,4 @@ def convex_everywhere(scene: Scene, bench: Bench, rules: Array, alpha: Array) ->
         if scene.marks[m, COUPLED]:
             angles_inside(scene, rules, m, alpha, scene.vectors[Y], scene.turns[PSI])
             turn_moments(scene, m)
-    return factorize(scene, bench, rules, 1, WORST, 0.0, 0.0, -1.0)
+    return factorize(scene, bench, rules, FINE, WORST, 0.0, 0.0, -1.0)

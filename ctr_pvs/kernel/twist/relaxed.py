@@ -12,7 +12,7 @@ import math
 from ctr_pvs.kernel.arrays import COUPLED
 from ctr_pvs.kernel.arrays import GAUSS
 from ctr_pvs.kernel.arrays import GRADIENT
-from ctr_pvs.kernel.arrays import LAST_COUPLED
+from ctr_pvs.kernel.arrays import LAST_ACTIVE
 from ctr_pvs.kernel.arrays import N_ELEMENTS
 from ctr_pvs.kernel.arrays import N_UNKNOWNS
 from ctr_pvs.kernel.arrays import OTHER
@@ -33,6 +33,7 @@ from ctr_pvs.kernel.twist.condensation import substitute
 from ctr_pvs.kernel.twist.element import EXACT
 from ctr_pvs.kernel.twist.element import energy_gradient
 from ctr_pvs.kernel.twist.element import energy_value
+from ctr_pvs.kernel.twist.fields import FINE
 from ctr_pvs.kernel.twist.newton import twist_size
 
 #: With more tubes than this the starts no longer try every combination of half turns.
@@ -116,45 +117,45 @@ def is_balanced(scene: Scene, scale: float) -> bool:
     for j in range(scene.base.shape[1]):
         if abs(scene.held[TORQUE, 0, j]) > NO_TORQUE * scale:
             return False
-    return twist_size(scene, scene.vectors[GRADIENT], 1) <= NO_TORQUE
+    return twist_size(scene, scene.vectors[GRADIENT], FINE) <= NO_TORQUE
 
 
 @compiled
-def at_rest(scene: Scene, bench: Bench, rules: Array, alpha: Array, scale: float) -> bool:
+def at_rest(scene: Scene, bench: Bench, tubes: Array, rules: Array, alpha: Array, scale: float) -> bool:
     """True if no torque acts on any base or unknown at ``y``, and the energy is convex there."""
-    energy_gradient(scene, rules, alpha)
+    energy_gradient(scene, bench, tubes, rules, alpha)
     if not is_balanced(scene, scale):
         return False
-    return factorize(scene, bench, rules, 1, EXACT, 0.0, 0.0, 1e-9 * scale)
+    return factorize(scene, bench, rules, FINE, EXACT, 0.0, 0.0, 1e-9 * scale)
 
 
 @compiled
-def descend(scene: Scene, bench: Bench, rules: Array, alpha: Array, scale: float) -> bool:
+def descend(scene: Scene, bench: Bench, tubes: Array, rules: Array, alpha: Array, scale: float) -> bool:
     """Goes down from ``y`` and the base angles alpha (N,), both changed, to a minimum; false if none is reached.
 
     Newton with a shifted Hessian, accepted where the energy falls."""
     shift, saddles = 0.0, 0
-    value = energy_value(scene, rules, alpha)
+    value = energy_value(scene, tubes, rules, alpha)
     for _ in range(MOST_DESCENT):
-        energy_gradient(scene, rules, alpha)
-        while not factorize(scene, bench, rules, 1, EXACT, 0.0, shift, max(shift, 1e-12) * scale):
+        energy_gradient(scene, bench, tubes, rules, alpha)
+        while not factorize(scene, bench, rules, FINE, EXACT, 0.0, shift, max(shift, 1e-12) * scale):
             shift = max(FIRST_SHIFT, BRAKE * shift)
         longest = free_step(scene, bench, alpha)
         if longest < DESCENDED or (longest < JITTER and is_balanced(scene, scale)):
             if shift == 0.0:
                 return True
-            if not factorize(scene, bench, rules, 1, EXACT, 0.0, 0.0, 1e-9 * scale):
+            if not factorize(scene, bench, rules, FINE, EXACT, 0.0, 0.0, 1e-9 * scale):
                 saddles += 1
                 if saddles > SADDLES:
                     return False
                 for j in range(1, len(alpha)):
                     alpha[j] += LEAVE_SADDLE * (1.0 - 0.3 * j)
-                value = energy_value(scene, rules, alpha)
+                value = energy_value(scene, tubes, rules, alpha)
             shift = 0.0
             continue
         share = min(1.0, LONGEST_TURN / longest)
         take_step(scene, bench, alpha, share)
-        ahead = energy_value(scene, rules, alpha)
+        ahead = energy_value(scene, tubes, rules, alpha)
         if ahead <= value + 1e-14 * scale:
             value = ahead
             shift = shift * EASE if shift * EASE > 1e-9 else 0.0
@@ -173,8 +174,8 @@ def free_step(scene: Scene, bench: Bench, alpha: Array) -> float:
         scene.vectors[OTHER, u] = -scene.vectors[GRADIENT, u]
     for j in range(len(alpha)):
         bench.lines[TURNED_BY, j] = -scene.held[TORQUE, 0, j]
-    substitute(scene, bench, 1, scene.vectors[OTHER], bench.lines[TURNED_BY], scene.vectors[STEP], True)
-    longest = twist_size(scene, scene.vectors[STEP], 1)
+    substitute(scene, bench, FINE, scene.vectors[OTHER], bench.lines[TURNED_BY], scene.vectors[STEP], True)
+    longest = twist_size(scene, scene.vectors[STEP], FINE)
     for j in range(len(alpha)):
         longest = max(longest, abs(bench.lines[TURNED_BY, j]))
     return longest
@@ -205,7 +206,7 @@ def nearer(a: Array, b: Array) -> bool:
 
 
 @compiled
-def relax(scene: Scene, bench: Bench, rules: Array, best: Array, work: Array) -> int:
+def relax(scene: Scene, bench: Bench, tubes: Array, rules: Array, best: Array, work: Array) -> int:
     """The relaxed state: base angles into ``best`` (N,), unknowns into ``y``.
 
     1: found; 2: found, and others are as near to zero; 0: the search finds no minimum.  work (6, N) : room.
@@ -217,7 +218,7 @@ def relax(scene: Scene, bench: Bench, rules: Array, best: Array, work: Array) ->
         best[j] = alpha[j] = 0.0
     for u in range(scene.counts[N_UNKNOWNS]):
         scene.vectors[Y, u] = 0.0
-    if scene.counts[LAST_COUPLED] == 0 or at_rest(scene, bench, rules, alpha, scale):
+    if scene.counts[LAST_ACTIVE] == 0 or at_rest(scene, bench, tubes, rules, alpha, scale):
         return 1
     align(scene, aligned, work[2:6])
     starts = 2 ** (N - 1) if N <= MANY_TUBES else 1
@@ -229,7 +230,7 @@ def relax(scene: Scene, bench: Bench, rules: Array, best: Array, work: Array) ->
                 alpha[j] += math.pi
         for u in range(scene.counts[N_UNKNOWNS]):
             scene.vectors[Y, u] = 0.0
-        if not descend(scene, bench, rules, alpha, scale):
+        if not descend(scene, bench, tubes, rules, alpha, scale):
             continue
         apart, size, size_best = 0.0, 0.0, 0.0
         for j in range(N):

@@ -10,6 +10,7 @@ from ctr_pvs.kernel.arrays import FLOOR
 from ctr_pvs.kernel.arrays import GRADIENT
 from ctr_pvs.kernel.arrays import LEADER
 from ctr_pvs.kernel.arrays import N_ELEMENTS
+from ctr_pvs.kernel.arrays import N_LOADS
 from ctr_pvs.kernel.arrays import N_UNKNOWNS
 from ctr_pvs.kernel.arrays import NONE
 from ctr_pvs.kernel.arrays import OTHER
@@ -18,6 +19,7 @@ from ctr_pvs.kernel.arrays import RAISED
 from ctr_pvs.kernel.arrays import ROOT
 from ctr_pvs.kernel.arrays import S_ESTIMATE
 from ctr_pvs.kernel.arrays import S_FLOOR
+from ctr_pvs.kernel.arrays import S_LOADS
 from ctr_pvs.kernel.arrays import S_RAISED
 from ctr_pvs.kernel.arrays import S_RESIDUAL
 from ctr_pvs.kernel.arrays import S_ROLL
@@ -27,7 +29,6 @@ from ctr_pvs.kernel.arrays import S_SWUNG
 from ctr_pvs.kernel.arrays import S_TIP
 from ctr_pvs.kernel.arrays import S_TWISTS
 from ctr_pvs.kernel.arrays import S_UNKNOWNS
-from ctr_pvs.kernel.arrays import SIZE
 from ctr_pvs.kernel.arrays import STATE
 from ctr_pvs.kernel.arrays import STEP
 from ctr_pvs.kernel.arrays import SWING
@@ -50,16 +51,19 @@ from ctr_pvs.kernel.carry import carry
 from ctr_pvs.kernel.carry import drop_finer
 from ctr_pvs.kernel.carry import remember_from
 from ctr_pvs.kernel.compiler import compiled
-from ctr_pvs.kernel.layout import FINER
-from ctr_pvs.kernel.layout import INTEGRATION_SHARE
 from ctr_pvs.kernel.layout import holds
 from ctr_pvs.kernel.layout import prepare
+from ctr_pvs.kernel.loaded.tangent import solve_tangent
+from ctr_pvs.kernel.sections import FINER
+from ctr_pvs.kernel.sections import INTEGRATION_SHARE
 from ctr_pvs.kernel.twist.condensation import factorize
-from ctr_pvs.kernel.twist.condensation import substitute
+from ctr_pvs.kernel.twist.element import EXACT
 from ctr_pvs.kernel.twist.element import LOWERED
 from ctr_pvs.kernel.twist.element import WIDER
 from ctr_pvs.kernel.twist.element import energy_gradient
-from ctr_pvs.kernel.twist.element import used
+from ctr_pvs.kernel.twist.fields import COARSE
+from ctr_pvs.kernel.twist.fields import FINE
+from ctr_pvs.kernel.twist.fields import counted
 from ctr_pvs.kernel.twist.newton import certainly_convex
 from ctr_pvs.kernel.twist.newton import correct
 from ctr_pvs.kernel.twist.newton import largest_turn
@@ -74,6 +78,8 @@ OK, NOT_PROVEN, TOO_SMALL, FOLD, MORE = range(5)
 
 #: Largest change [rad] of the angle between two tubes in one step.
 LARGEST_TURN = 1.0
+#: Longest first Newton step [rad], of twist or of how the loads turn the frame, under load.
+LARGEST_BEND = 0.5
 #: Largest slide in one step, as a share of the longest tube: the tubes could couple more in between than at either end.
 LARGEST_SLIDE = 0.05
 #: The estimate is this many times what two more degrees move to first order: fitted, see bench/accuracy/effectivity.
@@ -90,18 +96,25 @@ def open_state(kit: Kit, state: Array, tolerance: float) -> int:
     N = len(kit.segments)
     D = state[STATE + N : STATE + 2 * N]
     raised, floor = int(state[S_RAISED]), int(state[S_FLOOR])
-    which = 1 if holds(scene_of(kit, 1), D, raised, floor) else 0
+    loads = state[STATE + 3 * N : loads_end(state, N)]
+    which = 1 if holds(scene_of(kit, 1), D, loads, raised, floor) else 0
     scene = scene_of(kit, which)
-    if not prepare(kit, scene, D, tolerance, raised, floor):
+    if not prepare(kit, scene, D, loads, tolerance, raised, floor):
         return -1
     load_state(scene, state)
     return which
 
 
 @compiled
+def loads_end(state: Array, tubes: int) -> int:
+    """Where the packed loads of ``state`` end; they begin after 3 numbers for every tube."""
+    return STATE + 3 * tubes + int(state[S_LOADS])
+
+
+@compiled
 def load_state(scene: Scene, state: Array) -> None:
     """The unknowns of ``state`` into a scene that is cut for it."""
-    first = STATE + 3 * scene.base.shape[1]
+    first = loads_end(state, scene.base.shape[1])
     for u in range(int(state[S_UNKNOWNS])):
         scene.vectors[Y, u] = state[first + u]
 
@@ -110,12 +123,13 @@ def load_state(scene: Scene, state: Array) -> None:
 def write_state(scene: Scene, alpha: Array, steps: int, twists: float, out: Array) -> bool:
     """The unknowns of ``scene`` at base angles alpha (N,) as a state, with its torques; false if ``out`` is too short
     for it."""
-    N, U = len(alpha), scene.counts[N_UNKNOWNS]
-    if len(out) < STATE + 3 * N + U:
+    N, U, L = len(alpha), scene.counts[N_UNKNOWNS], scene.counts[N_LOADS]
+    if len(out) < STATE + 3 * N + L + U:
         return False
     out[S_RAISED], out[S_FLOOR], out[S_UNKNOWNS] = scene.counts[RAISED], scene.counts[FLOOR], U
     for i in range(S_RESIDUAL, STATE):
         out[i] = math.nan
+    out[S_LOADS] = L
     out[S_STEPS], out[S_TWISTS], out[S_SOLVED] = steps, twists, solved_for(scene)
     for j in range(N):
         out[STATE + j], out[STATE + N + j], out[STATE + 2 * N + j] = (
@@ -123,8 +137,10 @@ def write_state(scene: Scene, alpha: Array, steps: int, twists: float, out: Arra
             scene.base[AT, j],
             scene.held[TORQUE, 0, j],
         )
+    for i in range(L):
+        out[STATE + 3 * N + i] = scene.loads[i]
     for u in range(U):
-        out[STATE + 3 * N + u] = scene.vectors[Y, u]
+        out[STATE + 3 * N + L + u] = scene.vectors[Y, u]
     return True
 
 
@@ -133,8 +149,7 @@ def solved_for(scene: Scene) -> int:
     """How many unknowns a state has, those that only check left out; none where nothing couples the tubes."""
     count = 0
     for m in range(scene.counts[N_ELEMENTS]):
-        for j in range(scene.base.shape[1]):
-            count += used(scene.parts[SIZE, m, j], 0)
+        count += counted(scene, m, COARSE)
     if count > 0:
         for j in range(scene.base.shape[1]):
             count += 1 if scene.base[ROOT, j] > 0.0 else 0
@@ -143,10 +158,11 @@ def solved_for(scene: Scene) -> int:
 
 @compiled
 def step(
-    kit: Kit, last: Array, alpha: Array, D: Array,
+    kit: Kit, last: Array, alpha: Array, D: Array, loads: Array,
     tolerance: float, raised: int, floor: int, slack: float, untwisted: bool, tip: bool, out: Array,
 ) -> int:  # fmt: skip
-    """The equilibrium at (alpha, D), (N,) [rad], [m], on the branch of the state ``last``, into ``out``.
+    """The equilibrium at (alpha, D), (N,) [rad], [m], under packed ``loads``, on the branch of the state ``last``, into
+    ``out``.
 
     raised, floor : degrees, see ``plan_sections``.  slack : by which the converged model may differ [rad], 0 for what
     the tolerance suggests.  untwisted : take the state without twist where that is near enough.
@@ -157,26 +173,29 @@ def step(
     if which < 0:
         return TOO_SMALL
     old, bench = scene_of(kit, which), bench_of(kit)
-    same = holds(old, D, raised, floor)
+    same = holds(old, D, loads, raised, floor)
     new = old if same else scene_of(kit, 1 - which)
-    if not same and not prepare(kit, new, D, tolerance, raised, floor):
+    if not same and not prepare(kit, new, D, loads, tolerance, raised, floor):
         return TOO_SMALL
     before = last[STATE : STATE + N]
-    moved, turns = False, False
+    moved, turns, loaded = False, False, len(loads) > 0
     for j in range(N):
         moved = moved or D[j] != old.base[AT, j]
         turns = turns or alpha[j] != before[j]
     if slack == 0.0:
         slack = slack_of(new, tolerance)
     set_out(old, new, kit.rules, before, same)
-    if untwisted and try_untwisted(new, bench, kit.tubes, kit.rules, alpha, slack, tolerance, out):
-        return OK
-    if untwisted:
+    if untwisted and not loaded:
+        if try_untwisted(new, bench, kit.tubes, kit.rules, alpha, slack, tolerance, out):
+            return OK
         load_state(old, last)
         set_out(old, new, kit.rules, before, same)
-    if turns:
-        predict(new, bench, kit.rules, before, alpha)
-    steps = settle(new, bench, kit.rules, alpha, slack)
+    first = 0.0
+    if turns or loaded:
+        first = predict(new, bench, kit.tubes, kit.rules, before, alpha)
+    if loaded and not first < LARGEST_BEND:
+        return NOT_PROVEN
+    steps = settle(new, bench, kit.tubes, kit.rules, alpha, slack, first)
     turned = largest_turn(new)
     if steps < 0 or turned > LARGEST_TURN:
         return NOT_PROVEN
@@ -184,9 +203,9 @@ def step(
         return TOO_SMALL
     if tip:
         finish(new, bench, kit.tubes, kit.rules, alpha, slack, tolerance, out)
-    if moved:
+    if moved and not loaded:
         load_state(old, last)
-        if not certainly_convex(old, bench, kit.rules, before, (1.0 + WIDER) * turned + slack):
+        if not certainly_convex(old, bench, kit.tubes, kit.rules, before, (1.0 + WIDER) * turned + slack):
             return NOT_PROVEN
     return OK
 
@@ -205,22 +224,25 @@ def set_out(old: Scene, new: Scene, rules: Array, alpha: Array, same: bool) -> N
 
 
 @compiled
-def settle(scene: Scene, bench: Bench, rules: Array, alpha: Array, slack: float) -> int:
+def settle(
+    scene: Scene, bench: Bench, tubes: Array, rules: Array, alpha: Array, slack: float, first: float
+) -> int:  # fmt: skip
     """Newton from ``y`` to the equilibrium at alpha (N,) [rad], and the check: the steps it took, -1 if it fails.
 
-    The Hessian that is then factorised is that of the finer degree, lowered to hold on the box around the state,
-    ``before`` and ``slack`` [rad] more."""
-    steps = 0
+    The Hessian that is then factorised is that of the finer degree; without loads it is lowered to hold on the box
+    around the state, ``before`` and ``slack`` [rad] more.  first : length [rad] of the step that predicted ``y``."""
+    steps, kind = 0, LOWERED if scene.counts[N_LOADS] == 0 else EXACT
     for _ in range(POLISHES):
-        taken = correct(scene, bench, rules, alpha, 0, False)
+        taken = correct(scene, bench, tubes, rules, alpha, COARSE, False, first)
         if taken < 0:
             return -1
         steps += taken
-        energy_gradient(scene, rules, alpha)
-        if not factorize(scene, bench, rules, 1, LOWERED, slack, 0.0, -1.0):
+        energy_gradient(scene, bench, tubes, rules, alpha)
+        if not factorize(scene, bench, rules, FINE, kind, slack, 0.0, -1.0):
             return -1
-        if twist_size(scene, scene.vectors[GRADIENT], 0) <= residual_limit(alpha):
+        if twist_size(scene, scene.vectors[GRADIENT], COARSE) <= residual_limit(alpha):
             return steps
+        first = 0.0
     return -1
 
 
@@ -232,10 +254,10 @@ def finish(
     too far away to be believed."""
     for u in range(scene.counts[N_UNKNOWNS]):
         scene.vectors[OTHER, u] = -scene.vectors[GRADIENT, u]
-    substitute(scene, bench, 1, scene.vectors[OTHER], bench.lines[NONE], scene.vectors[STEP], False)
-    bend(scene, rules, alpha)
+    solve_tangent(scene, bench, FINE, scene.vectors[OTHER], bench.lines[NONE], scene.vectors[STEP], 1.0)
+    bend(scene, rules)
     put_tip(scene, tubes, rules, out)
-    change = twist_size(scene, scene.vectors[STEP], 1)
+    change = twist_size(scene, scene.vectors[STEP], FINE)
     out[S_SWUNG] = change * scene.base[SWING, 0]
     far = change > max(slack, slack_of(scene, tolerance))
     motion = math.inf if far else backbone_motion(scene, bench, tubes, rules, scene.vectors[STEP])
@@ -245,7 +267,7 @@ def finish(
 @compiled
 def put_tip(scene: Scene, tubes: Array, rules: Array, out: Array) -> None:
     """Residual, number of unknowns and tip of a state whose gradient and curvature ``scene`` holds, into ``out``."""
-    out[S_RESIDUAL], out[S_SOLVED] = twist_size(scene, scene.vectors[GRADIENT], 0), solved_for(scene)
+    out[S_RESIDUAL], out[S_SOLVED] = twist_size(scene, scene.vectors[GRADIENT], COARSE), solved_for(scene)
     chain(scene, tubes, rules)
     M = scene.counts[N_ELEMENTS]
     put_pose(scene.frame[M, 0], scene.frame[M, 1], scene.held[ANGLE, M, scene.counts[LEADER]], out[S_ROLL : S_ROLL + 4])
@@ -261,10 +283,10 @@ def try_untwisted(
     ``before``."""
     for u in range(scene.counts[N_UNKNOWNS]):
         scene.vectors[Y, u] = 0.0
-    energy_gradient(scene, rules, alpha)
-    if twist_size(scene, scene.vectors[GRADIENT], 1) * scene.base[SWING, 0] > PERHAPS_UNTWISTED * tolerance:
+    energy_gradient(scene, bench, tubes, rules, alpha)
+    if twist_size(scene, scene.vectors[GRADIENT], FINE) * scene.base[SWING, 0] > PERHAPS_UNTWISTED * tolerance:
         return False
-    if largest_turn(scene) > LARGEST_TURN or not factorize(scene, bench, rules, 1, LOWERED, slack, 0.0, -1.0):
+    if largest_turn(scene) > LARGEST_TURN or not factorize(scene, bench, rules, FINE, LOWERED, slack, 0.0, -1.0):
         return False
     if not write_state(scene, alpha, 0, UNTWISTED, out):
         return False
