@@ -20,9 +20,12 @@ from ctr_pvs.answer.backbone import Pose
 from ctr_pvs.answer.status import NoEquilibriumError
 from ctr_pvs.answer.status import Status
 from ctr_pvs.errors import CommandError
+from ctr_pvs.errors import LoadError
 from ctr_pvs.errors import RobotError
 from ctr_pvs.errors import RobotFileError
 from ctr_pvs.robot.file import load_robot
+from ctr_pvs.robot.loads import Loads
+from ctr_pvs.robot.loads import PointForce
 from ctr_pvs.robot.robot import Limits
 from ctr_pvs.robot.robot import Robot
 from ctr_pvs.robot.robot import Segment
@@ -31,6 +34,7 @@ from ctr_pvs.robot.robot import Tube
 if TYPE_CHECKING:
     from ctr_pvs.answer.equilibrium import Equilibrium
     from ctr_pvs.solve.batch import Batch
+    from ctr_pvs.solve.equilibria import equilibria
     from ctr_pvs.solve.solver import EquilibriumSolver
 
 __all__ = [
@@ -40,7 +44,10 @@ __all__ = [
     "Equilibrium",
     "EquilibriumSolver",
     "Limits",
+    "LoadError",
+    "Loads",
     "NoEquilibriumError",
+    "PointForce",
     "Pose",
     "Robot",
     "RobotError",
@@ -48,6 +55,7 @@ __all__ = [
     "Segment",
     "Status",
     "Tube",
+    "equilibria",
     "load_robot",
 ]
 
@@ -55,6 +63,7 @@ _LATER = {
     "Batch": "ctr_pvs.solve.batch",
     "Equilibrium": "ctr_pvs.answer.equilibrium",
     "EquilibriumSolver": "ctr_pvs.solve.solver",
+    "equilibria": "ctr_pvs.solve.equilibria",
 }
 
 if not TYPE_CHECKING:  # checkers would take any name for one of ours

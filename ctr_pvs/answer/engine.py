@@ -17,10 +17,12 @@ from ctr_pvs.kernel import outputs
 from ctr_pvs.kernel.arrays import CAPACITIES
 from ctr_pvs.kernel.arrays import ELEMENTS
 from ctr_pvs.kernel.arrays import FACTORS
+from ctr_pvs.kernel.arrays import LOADS
 from ctr_pvs.kernel.arrays import NODES
 from ctr_pvs.kernel.arrays import SECTIONS
 from ctr_pvs.kernel.arrays import STATE
 from ctr_pvs.kernel.arrays import UNKNOWNS
+from ctr_pvs.kernel.arrays import WIDEST
 from ctr_pvs.kernel.arrays import workspace_sizes
 from ctr_pvs.kernel.walk.step import NOT_PROVEN
 from ctr_pvs.kernel.walk.step import TOO_SMALL
@@ -36,6 +38,10 @@ Code = int
 FIRST_UNKNOWNS = 48
 
 
+#: For a single step.
+NO_ROOM, NO_CODES = np.empty((2, 0)), np.empty(0, dtype=np.int64)
+
+
 class Workspace:
     """The arrays that the kernel works in, of a capacity that only grows."""
 
@@ -44,7 +50,8 @@ class Workspace:
         self.capacity = np.zeros(CAPACITIES, dtype=np.int64)
         self.capacity[SECTIONS], self.capacity[ELEMENTS] = sections, sections
         self.capacity[NODES], self.capacity[UNKNOWNS] = 12 * sections, 20 * tubes * sections
-        self.capacity[FACTORS] = sections * (8 * tubes) ** 2
+        self.capacity[FACTORS] = sections * (9 * tubes) ** 2
+        self.capacity[WIDEST] = 12 * tubes
         self._allocate()
 
     def _allocate(self) -> None:
@@ -57,10 +64,12 @@ class Workspace:
         if self.ints[SECTIONS] >= 0:
             return False
         wanted = self.ints[:CAPACITIES].copy()
-        wanted[SECTIONS] = self.capacity[SECTIONS]
+        exact = [SECTIONS, LOADS]
+        wanted[SECTIONS] = -wanted[SECTIONS]
         # Half as much again: along a path elements come and go.
-        self.capacity = np.maximum(self.capacity, wanted + wanted // 2)
-        self.capacity[SECTIONS] = wanted[SECTIONS]
+        capacity = np.maximum(self.capacity, wanted + wanted // 2)
+        capacity[exact] = np.maximum(self.capacity, wanted)[exact]
+        self.capacity = capacity
         self._allocate()
         return True
 
@@ -105,45 +114,41 @@ class Engine:
         if not self.workspace.grow():
             self.state_size = 2 * self.state_size
 
-    def advance(self, last: Array, alpha: Array, D: Array, untwisted: bool) -> tuple[Code, Array]:
-        """One proven step from the state ``last``: see ``entries.advance``."""
+    def step(
+        self, last: Array, alpha: Array, D: Array, loads: Array, raised: int = 0, floor: int = 0, slack: float = 0.0,
+        untwisted: bool = False, tip: bool = True,
+    ) -> tuple[Code, Array]:  # fmt: skip
+        """One checked step from the state ``last``, to packed ``loads``: see ``step.step``."""
         while True:
             out = np.empty(self.state_size)
             work = self.workspace
-            code = entries.advance(
-                self.tubes, self.segments, self.rules, work.floats, work.ints, last, alpha, D, self.tolerance,
-                untwisted, out,
+            code = entries.take_steps(
+                self.tubes, self.segments, self.rules, work.floats, work.ints, last, alpha, D, loads,
+                self.tolerance, raised, floor, slack, untwisted, tip, out, NO_ROOM, NO_CODES,
             )  # fmt: skip
             if code != TOO_SMALL:
                 return code, out
             self.grow()
 
-    def cold_start(self, alpha: Array, D: Array, untwisted: bool) -> tuple[Code, Array]:
-        """See ``cold.cold``."""
-        out, codes = np.empty((1, 0)), np.empty(1, dtype=np.int64)
-
-        def call() -> Code:
-            nonlocal out
-            out, codes[0] = np.empty((1, self.state_size)), -1
-            return entries.cold_rows(
-                *self.fixed(), alpha[None], D[None], self.tolerance, untwisted, self.room(), out, codes
-            )
-
-        self.repeat(call)
-        return int(codes[0]), out[0]
-
     def cold_rows(self, alpha: Array, D: Array, untwisted: bool, out: Array, codes: Ints) -> None:
-        """See ``entries.cold_rows``."""
+        """Cold starts at the commands alpha, D (M, N): the first columns of their states into ``out`` (M, W), what
+        ``alone.cold`` says into codes (M,); see ``entries.take_steps``."""
+        flat = alpha.reshape(-1), D.reshape(-1)
         self.repeat(
-            lambda: entries.cold_rows(*self.fixed(), alpha, D, self.tolerance, untwisted, self.room(), out, codes)
-        )
+            lambda: entries.take_steps(
+                *self.fixed(), flat[0][:0], *flat, flat[0][:0], self.tolerance, 0, 0, 0.0, untwisted, True,
+                out.reshape(-1), np.empty((2, max(self.state_size, 7 * self.robot.n_tubes))), codes,
+            )
+        )  # fmt: skip
 
-    def room(self) -> Array:
-        """(4, L) where a cold start works."""
-        room: Array | None = getattr(self._local, "room", None)
-        if room is None or room.shape[1] < self.state_size:
-            room = self._local.room = np.zeros((4, self.state_size))
-        return room
+    def cold_start(self, alpha: Array, D: Array, untwisted: bool) -> tuple[Code, Array]:
+        """``cold_rows`` for one command: its whole state."""
+        while True:
+            size = self.state_size
+            out, codes = np.empty((1, size)), np.full(1, -1, dtype=np.int64)
+            self.cold_rows(alpha, D, untwisted, out, codes)
+            if self.state_size == size:
+                return int(codes[0]), out[0]
 
     def untwisted(self, alpha: Array, D: Array) -> tuple[Code, Array]:
         """See ``entries.untwisted_state``."""
@@ -153,17 +158,6 @@ class Engine:
             nonlocal out
             out = np.empty(self.state_size)
             return entries.untwisted_state(*self.fixed(), alpha, D, self.tolerance, out)
-
-        return self.repeat(call), out
-
-    def settle(self, state: Array, untwisted: bool) -> tuple[Code, Array]:
-        """See ``cold.settle_down``."""
-        out = np.empty(0)
-
-        def call() -> Code:
-            nonlocal out
-            out = np.empty(self.state_size)
-            return entries.settle_state(*self.fixed(), state, self.tolerance, untwisted, out)
 
         return self.repeat(call), out
 
@@ -177,25 +171,6 @@ class Engine:
             return entries.relaxed_state(*self.fixed(), D, self.tolerance, degree, work, out)
 
         return self.repeat(call), out
-
-    def follow(
-        self, begin: Array, end: Array, clock: Array, degree: int, tries: int, state: Array
-    ) -> tuple[Code, Array]:
-        """See ``path.follow``; the state on the path."""
-        command = np.empty(2 * self.robot.n_tubes)
-
-        def call() -> Code:
-            nonlocal state
-            size = max(self.state_size, len(state))  # read once: other threads may make states grow
-            if len(state) != size:
-                state = np.concatenate([state, np.zeros(size - len(state))])
-            ahead = np.empty(size)
-            return entries.follow_path(
-                *self.fixed(), begin, end, clock, self.tolerance, degree, tries, state, ahead, command
-            )
-
-        state = state.copy()
-        return self.repeat(call), state
 
     def land(
         self, state: Array, command: Array, clock: Array, degree: int, steps: int, out: Array
@@ -223,12 +198,19 @@ class Engine:
         self.repeat(lambda: outputs.loads(*self.fixed(), state, self.tolerance, out))
         return out
 
-    def rates(self, state: Array) -> tuple[Code, Array, Array]:
-        """Jacobian (6, 2 N) and turns of the tubes' ends by alpha (N, N): see ``outputs.jacobian``."""
+    def rates(self, state: Array) -> tuple[Code, Array, Array, Array]:
+        """Rates of the tip (6, 2 N + 6) by alpha, D, force and moment on it, turns of the tubes' ends by alpha (N, N)
+        and torques and forces by force and moment on the tip (2 N, 6): see ``outputs.jacobian``."""
         N = self.robot.n_tubes
-        out, gain = np.zeros((2 * N, 6)), np.zeros((N, N))
-        code = self.repeat(lambda: outputs.jacobian(*self.fixed(), state, self.tolerance, out, gain))
-        return code, out.T, gain
+        out, gain, actuation = np.zeros((2 * N + 6, 6)), np.zeros((N, N)), np.zeros((2 * N, 6))
+        code = self.repeat(lambda: outputs.jacobian(*self.fixed(), state, self.tolerance, out, gain, actuation))
+        return code, out.T, gain, actuation
+
+    def base_wrench(self, state: Array) -> Array:
+        """(6,) force [N] and moment [N m] about the orifice of all beyond it: see ``outputs.base_wrench``."""
+        out = np.zeros(6)
+        self.repeat(lambda: outputs.base_wrench(*self.fixed(), state, self.tolerance, out))
+        return out
 
     def relaxed_gain(self, D: Array, degree: int) -> float:
         """det(d psi_tip / d alpha) of the relaxed robot at D (N,); NaN if no relaxed state was found.  That of the last
@@ -255,7 +237,7 @@ class Engine:
         return psi, torque
 
     def elements(self, state: Array) -> Array:
-        """(M, 4) start and end [m], 1 where tubes are coupled, degree: see ``outputs.elements``."""
+        """(M, 4) start and end [m], 1 where fields vary inside, degree: see ``outputs.elements``."""
         out = np.empty((0, 4))
         while (count := outputs.elements(*self.fixed(), state, self.tolerance, out)) != len(out):
             if count < 0:

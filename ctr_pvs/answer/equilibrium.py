@@ -5,12 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cached_property
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ctr_pvs.answer.backbone import Backbone
 from ctr_pvs.answer.backbone import Pose
+from ctr_pvs.answer.degrees import settled
 from ctr_pvs.answer.engine import Engine
 from ctr_pvs.answer.shape import TorsionShape
 from ctr_pvs.answer.state import Snap
@@ -18,9 +20,11 @@ from ctr_pvs.answer.state import State
 from ctr_pvs.answer.status import NoEquilibriumError
 from ctr_pvs.answer.status import Status
 from ctr_pvs.kernel.walk.step import OK
+from ctr_pvs.model.packing import with_tip_point
 from ctr_pvs.model.shape import Shape
 from ctr_pvs.pvs.printed_loads import printed_forces
 from ctr_pvs.pvs.virtual_work import Loads
+from ctr_pvs.robot.loads import Loads as ExternalLoads
 
 Array = NDArray[np.float64]
 
@@ -36,12 +40,20 @@ def spaced(n: int) -> Array:
     return numbers
 
 
+class Wrench(NamedTuple):
+    """force (3,) [N] and moment (3,) [N m]."""
+
+    force: Array
+    moment: Array
+
+
 class Equilibrium:
     """What came of one command.
 
     alpha, D : (N,) the command [rad], [m].
     status, message : the outcome, in one word and in one line; ``success`` is true for "ok" and "snap".
     tolerance : of the tip [m]; fidelity : model level.
+    applied_loads : the external loads that act, None where none does; ``loads`` are those of the actuators.
     iterations : Newton steps spent on the way from the start to this answer.
     snaps : the snaps on the way, each with its place on the path, the states before and after, and the energy released.
 
@@ -61,6 +73,7 @@ class Equilibrium:
         state: State | None = None,
         iterations: int = 0,
         snaps: tuple[Snap, ...] = (),
+        loads: ExternalLoads | None = None,
         margin: float | None = None,
     ) -> None:
         self._engine, self.alpha, self.D = engine, alpha, D
@@ -69,6 +82,7 @@ class Equilibrium:
         self._state, self.iterations, self.snaps = state, iterations, snaps
         self._loads: Loads | None = None
         self._margin = margin
+        self.applied_loads = loads
 
     @property
     def success(self) -> bool:
@@ -108,7 +122,10 @@ class Equilibrium:
             return f"torsionless: twist {moved}"
         elements = self._engine.elements(self.state.vector)
         degrees = "/".join(f"{degree:.0f}" for degree in elements[elements[:, 2] > 0.0, 3])
-        where = f"polynomials of degree {degrees} where curved tubes overlap"
+        where = (
+            "where curved tubes overlap" if self.applied_loads is None else "where loads act or curved tubes overlap"
+        )
+        where = f"polynomials of degree {degrees} {where}"
         return f"{self.fidelity}: {self.degrees_of_freedom} unknowns, {where}; two more {moved}"
 
     @cached_property
@@ -167,10 +184,14 @@ class Equilibrium:
 
     def _computed_loads(self) -> tuple[Loads, float]:
         """Loads by virtual work, and the elastic energy [J]."""
-        numbers = self._engine.loads(self.state.vector)
+        numbers = self._numbers
         interval = np.empty((len(self.D), 2))
         interval[:, 0], interval[:, 1] = numbers[2], numbers[1]
         return Loads(numbers[0], numbers[1], interval, numbers[3] > 0.0), float(numbers[4, 0])
+
+    @cached_property
+    def _numbers(self) -> Array:
+        return self._engine.loads(self.state.vector)
 
     @property
     def torque(self) -> Array:
@@ -188,6 +209,13 @@ class Equilibrium:
         return self.loads.force_interval
 
     @property
+    def force_interval_reversed(self) -> NDArray[np.bool_]:
+        """(N,) true where D_j sits on a concave kink of the energy: the force towards -D is larger than that towards
+        +D, and no constant force holds the tube there."""
+        interval = self.loads.force_interval
+        return np.asarray(self.loads.kink & (interval[:, 0] > interval[:, 1]))
+
+    @property
     def kink(self) -> bool:
         """True if some D_j sits on a kink of the energy, where the holding force is an interval."""
         return bool(self.loads.kink.any())
@@ -197,6 +225,21 @@ class Equilibrium:
         """Elastic energy [J], straightening in the guide counted."""
         _ = self.loads
         return self._energy
+
+    @property
+    def potential(self) -> float:
+        """Elastic energy less the work of the external forces on their way from a straight robot [J]; NaN where a
+        moment acts: a dead moment has no potential."""
+        if self.applied_loads is None:
+            return self.energy
+        return float("nan") if self.applied_loads.has_moments else float(self._numbers[4, 0] - self._numbers[5, 0])
+
+    @property
+    def base_wrench(self) -> Wrench:
+        """Force [N] and moment [N m] about the orifice that the part beyond it exerts there, base axes: n(0+), m(0+).
+        The guide's reaction is the negative, and |k(0+)|^2 sum K / 2 along +x on the robot more."""
+        wrench = self._engine.base_wrench(self.state.vector)
+        return Wrench(wrench[:3], wrench[3:])
 
     @property
     def stability_margin(self) -> float:
@@ -218,11 +261,36 @@ class Equilibrium:
         return self._engine.relaxed_gain(self.D, RELAXED_DEGREE) / float(np.linalg.det(self._rates[1]))
 
     @cached_property
+    def _all_rates(self) -> tuple[Array, Array, Array]:
+        """Of the tip (6, 2 N + 6), of the tubes' ends (N, N), and of torques and forces (2 N, 6)."""
+        return _stable(self._engine.rates(self.state.vector))
+
+    @property
     def _rates(self) -> tuple[Array, Array]:
-        code, jacobian, gain = self._engine.rates(self.state.vector)
-        if code != OK:
-            raise NoEquilibriumError("an unstable equilibrium has no rates: the robot would not stay on it")
-        return jacobian, gain
+        return self._all_rates[0][:, : 2 * len(self.D)], self._all_rates[1]
+
+    @cached_property
+    def _load_rates(self) -> tuple[Array, Array]:
+        """Rates of the tip (6, 6) and of torques and forces (2 N, 6) with force and moment on the tip."""
+        loads = with_tip_point(self._engine.robot, self.D, self.state.loads)
+        if len(loads) == len(self.state.loads):
+            rates, _, actuation = self._all_rates
+        else:  # bending is not free up to the tip
+            code, vector = settled(self._engine, self.state.vector, loads, False)
+            rates, _, actuation = _stable(self._engine.rates(vector) if code == OK else (code, *3 * (np.empty(0),)))
+        return rates[:, 2 * len(self.D) :], actuation
+
+    @property
+    def compliance(self) -> Array:
+        """(6, 6) rates of the tip, position [m] and rotation [rad] in base axes, by force [N] and moment [N m] on it,
+        at held bases.  Symmetric unless a moment acts."""
+        return self._load_rates[0]
+
+    @property
+    def load_jacobian(self) -> Array:
+        """(2 N, 6) how torques [N m], then forces [N], change with force [N] and moment [N m] on the tip; without
+        moments it is minus the transpose of ``jacobian``.  At a kink it holds towards +D."""
+        return self._load_rates[1]
 
     @property
     def jacobian(self) -> Array:
@@ -233,3 +301,10 @@ class Equilibrium:
         mean.
         """
         return self._rates[0]
+
+
+def _stable(rates: tuple[int, Array, Array, Array]) -> tuple[Array, Array, Array]:
+    code, tip, ends, actuation = rates
+    if code != OK:
+        raise NoEquilibriumError("an unstable equilibrium has no rates: the robot would not stay on it")
+    return tip, ends, actuation

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ctr_pvs.kernel.arrays import S_ESTIMATE
+from ctr_pvs.kernel.arrays import S_LOADS
 from ctr_pvs.kernel.arrays import S_RESIDUAL
 from ctr_pvs.kernel.arrays import S_SOLVED
 from ctr_pvs.kernel.arrays import S_STEPS
@@ -44,6 +45,12 @@ class State:
         return self.vector[STATE + 2 * self._tubes : STATE + 3 * self._tubes].copy()
 
     @property
+    def loads(self) -> Array:
+        """Packed loads, see ``model.packing``."""
+        first = STATE + 3 * self._tubes
+        return self.vector[first : first + int(self.vector[S_LOADS])].copy()
+
+    @property
     def coupled(self) -> bool:
         """True if the tubes can twist each other: otherwise nothing is remembered."""
         return self.solved_for > 0
@@ -57,7 +64,7 @@ class State:
     @property
     def unknowns(self) -> Array:
         """(U,) [sqrt(J)] of the guide, then element by element and tube by tube."""
-        first = STATE + 3 * self._tubes
+        first = STATE + 3 * self._tubes + int(self.vector[S_LOADS])
         return self.vector[first : first + int(self.vector[S_UNKNOWNS])]
 
     @property
@@ -95,7 +102,8 @@ class State:
 class Snap:
     """One snap: where on the path, the states before and after, and the elastic energy released [J].
 
-    t : fraction of the straight path from the previous command to the new one; alpha (N,) [rad] and D (N,) [m] there.
+    t : fraction of the path from the previous command to the new one; alpha (N,) [rad], D (N,) [m] and packed loads
+    (L,) there.  No energy is known where point moments act: NaN.
     """
 
     t: float
@@ -104,3 +112,8 @@ class Snap:
     before: State
     after: State
     energy_released: float
+
+    @property
+    def command(self) -> Array:
+        """(2 N + L,) alpha, D and packed loads."""
+        return np.concatenate([self.alpha, self.D, self.before.loads])

@@ -21,6 +21,7 @@ from ctr_pvs.answer.engine import Engine
 from ctr_pvs.answer.equilibrium import Equilibrium
 from ctr_pvs.answer.status import Status
 from ctr_pvs.errors import CommandError
+from ctr_pvs.errors import LoadError
 from ctr_pvs.kernel.arrays import S_ESTIMATE
 from ctr_pvs.kernel.arrays import S_RESIDUAL
 from ctr_pvs.kernel.arrays import S_SOLVED
@@ -33,6 +34,7 @@ from ctr_pvs.kernel.arrays import UNTWISTED
 from ctr_pvs.kernel.walk.step import MORE
 from ctr_pvs.kernel.walk.step import OK
 from ctr_pvs.robot.command import LARGEST_ALPHA
+from ctr_pvs.robot.loads import Loads
 from ctr_pvs.robot.robot import Robot
 
 Array = NDArray[np.float64]
@@ -61,18 +63,26 @@ class ColdSolver(Protocol):
     tolerance: float
     force_model: str
 
-    def solve_alone(self, alpha: Array, D: Array) -> Equilibrium: ...
+    def solve_alone(self, alpha: Array, D: Array, loads: Loads | None) -> Equilibrium: ...
 
 
 def solve_rows(
-    cold: ColdSolver, engine: Engine, alpha: ArrayLike, D: ArrayLike, level: str, progress: Progress | None
+    cold: ColdSolver,
+    engine: Engine,
+    alpha: ArrayLike,
+    D: ArrayLike,
+    tip_force: ArrayLike | None,
+    tip_moment: ArrayLike | None,
+    level: str,
+    progress: Progress | None,
 ) -> Batch:
-    """Answers of cold starts to the commands ``alpha`` [rad], ``D`` [m] (M, N) at a model level.
+    """Answers of cold starts to the commands ``alpha`` [rad], ``D`` [m] (M, N) and forces [N] and moments [N m] on the
+    tip (M, 3) at a model level.
 
     progress : called as progress(done, total) after every block of rows.
 
     A row that the robot cannot take is told in the batch.  Raises ``CommandError`` for arrays that are no tables of
-    real numbers with a column per tube.
+    real numbers with a column per tube, ``LoadError`` for tip loads that are none of 3 columns and as many rows.
     """
     tubes = cold.robot.n_tubes
     batch = Batch(cold, level, _table("alpha", alpha, tubes), _table("D", D, tubes))
@@ -80,7 +90,9 @@ def solve_rows(
         raise CommandError("D", batch.D.shape, f"as many rows as alpha has, {len(batch.alpha)}")
     for index in np.flatnonzero(~_plainly_good(cold.robot, batch.alpha, batch.D)).tolist():
         batch.mend(index)
-    together = level in ("auto", "torsion")
+    if len(batch) and (tip_force is not None or tip_moment is not None):
+        batch.load(_tip_loads("tip_force", tip_force, len(batch)), _tip_loads("tip_moment", tip_moment, len(batch)))
+    together = level in ("auto", "torsion") and batch.wrench is None
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         for start in range(0, len(batch), BLOCK):
             stop = min(start + BLOCK, len(batch))
@@ -107,6 +119,15 @@ def _table(name: str, values: ArrayLike, tubes: int) -> Array:
     return np.array(array, dtype=np.float64, order="C")
 
 
+def _tip_loads(name: str, values: ArrayLike | None, count: int) -> Array:
+    if values is None:
+        return np.zeros((count, 3))
+    array = np.asarray(values)
+    if array.shape != (count, 3) or array.dtype.kind not in "iuf" or not np.isfinite(array).all():
+        raise LoadError(name, values, f"a table of finite numbers, {count} rows as alpha has, 3 columns")
+    return array.astype(np.float64)
+
+
 def _plainly_good(robot: Robot, alpha: Array, D: Array) -> Mask:
     """(rows,) true for commands that ``Robot.check_command`` takes as they are."""
     good = np.ones(len(alpha), dtype=bool)
@@ -124,6 +145,7 @@ class Batch:
     """Answers to M commands; ``batch[i]`` is that of row i with every output that single answers have.
 
     alpha, D : (M, N) the commands [rad], [m].  Rows without an equilibrium hold NaN, and zeros for counts.
+    wrench : (M, 6) force [N] and moment [N m] on the tips, None without.
     tip_position : (M, 3) [m]; tip_orientation : (M, 4) unit quaternions x, y, z, w; torque : (M, N) [N m].
     residual : (M,) [rad] and error_estimate : (M,) [m], as ``Equilibrium`` has them; iterations, degrees_of_freedom :
     (M,).
@@ -138,6 +160,7 @@ class Batch:
         self._codes = np.full(count, UNSOLVED, dtype=np.int64)
         self.rejected = np.zeros(count, dtype=bool)
         self._status = np.full(count, _CODES[Status.OK], dtype=np.int8)
+        self.wrench: Array | None = None
         self._messages: dict[int, str] = {}
         self._levels: dict[int, str] = {}
 
@@ -151,7 +174,18 @@ class Batch:
             engine = Engine(self._cold.robot, self._cold.tolerance)
             status, message = self.status[index], self.message(index)
             return Equilibrium(engine, self.alpha[index], self.D[index], status, message, self._level)
-        return self._cold.solve_alone(self.alpha[index].copy(), self.D[index].copy())
+        return self._cold.solve_alone(self.alpha[index].copy(), self.D[index].copy(), self.applied_loads(index))
+
+    def load(self, force: Array, moment: Array) -> None:
+        """Puts forces [N] and moments [N m], (M, 3) each, on the tips."""
+        self.wrench = np.hstack([force, moment])
+
+    def applied_loads(self, index: int) -> Loads | None:
+        """What acts on the tip of one row."""
+        if self.wrench is None or not self.wrench[index].any():
+            return None
+        fx, fy, fz, mx, my, mz = self.wrench[index].tolist()
+        return Loads((fx, fy, fz), (mx, my, mz))
 
     @property
     def tip_position(self) -> Array:
@@ -195,6 +229,10 @@ class Batch:
     def fidelity(self) -> list[str]:
         """Model level of each row."""
         levels = ["torsionless" if twists == UNTWISTED else "torsion" for twists in self._numbers[:, S_TWISTS].tolist()]
+        if self.wrench is not None:
+            levels = [
+                "full" if loaded else level for loaded, level in zip(np.any(self.wrench, axis=1), levels, strict=True)
+            ]
         for index, level in self._levels.items():
             levels[index] = level
         return levels
@@ -238,7 +276,7 @@ class Batch:
 
     def solve_alone(self, index: int) -> None:
         """Leaves one row to the solver of single commands."""
-        answer = self._cold.solve_alone(self.alpha[index].copy(), self.D[index].copy())
+        answer = self._cold.solve_alone(self.alpha[index].copy(), self.D[index].copy(), self.applied_loads(index))
         self._status[index], self._messages[index] = _CODES[answer.status], answer.message
         self._levels[index], self._codes[index] = answer.fidelity, OK
         row = self._numbers[index]

@@ -27,14 +27,18 @@ from ctr_pvs.errors import FieldError
 from ctr_pvs.kernel.arrays import S_ESTIMATE
 from ctr_pvs.kernel.arrays import S_STEPS
 from ctr_pvs.kernel.twist.newton import residual_limit
+from ctr_pvs.model.packing import packed_loads
 from ctr_pvs.oracles.tip_curve import DEPTH
 from ctr_pvs.oracles.tip_curve import PairFold
 from ctr_pvs.oracles.tip_curve import TipCurve
 from ctr_pvs.oracles.tube_pair import TubePair
 from ctr_pvs.oracles.tube_pair import materials_at
 from ctr_pvs.oracles.tube_pair import tube_pair
+from ctr_pvs.robot.loads import Loads
+from ctr_pvs.robot.loads import check_loads
 from ctr_pvs.robot.robot import Robot
 from ctr_pvs.solve.dense import DenseEnergy
+from ctr_pvs.solve.loaded_search import loaded_from
 from ctr_pvs.solve.multistart import search
 
 Array = NDArray[np.float64]
@@ -74,10 +78,12 @@ class Equilibria:
         return tuple(one for one in self.found if one.success)
 
 
-def equilibria(robot: Robot, alpha: ArrayLike, D: ArrayLike, tolerance: float = 1e-5) -> Equilibria:
+def equilibria(
+    robot: Robot, alpha: ArrayLike, D: ArrayLike, tolerance: float = 1e-5, *, loads: Loads | None = None
+) -> Equilibria:
     """All equilibria at base rotations ``alpha`` (N,) [rad] and base positions ``D`` (N,) [m].
 
-    tolerance : tip error [m] that each may have.
+    tolerance : tip error [m] that each may have.  loads : under load, a search for stable ones only, never complete.
 
     Angles are not wrapped: psi is told against the alpha given, though a robot cannot tell whole turns of a base.
 
@@ -87,6 +93,23 @@ def equilibria(robot: Robot, alpha: ArrayLike, D: ArrayLike, tolerance: float = 
         raise FieldError("tolerance", tolerance, "a length from 1e-10 to 1 m")
     alpha, D = robot.check_command(alpha, D)
     polish = _Polish(Engine(robot, float(tolerance)), alpha, D)
+    if loads is not None and not loads.is_none:
+        return _under_load(polish, loads)
+    return _unloaded(polish)
+
+
+def _under_load(polish: _Polish, loads: Loads) -> Equilibria:
+    robot = polish.engine.robot
+    check_loads(robot, polish.D, loads)
+    states = [one.state for one in _unloaded(polish).stable]
+    packed = packed_loads(robot, polish.D, loads)
+    found = loaded_from(polish.engine, states, polish.alpha, polish.D, loads, packed)
+    method = f"the loads put on {len(states)} stable unloaded equilibria, in proportion: not guaranteed complete"
+    return Equilibria(tuple(found), False, True, method)
+
+
+def _unloaded(polish: _Polish) -> Equilibria:
+    robot, D = polish.engine.robot, polish.D
     materials = materials_at(robot, D)
     if not materials.coupled.any():
         found = polish.exact([lambda energy: np.zeros(energy.n)], np.array([ROOM]))

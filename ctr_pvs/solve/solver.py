@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-import time
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 from numpy.typing import NDArray
 
+from ctr_pvs.answer.degrees import missed
+from ctr_pvs.answer.degrees import raised
+from ctr_pvs.answer.degrees import settled
 from ctr_pvs.answer.engine import Engine
 from ctr_pvs.answer.equilibrium import Equilibrium
 from ctr_pvs.answer.full import FullEquilibrium
@@ -17,28 +20,36 @@ from ctr_pvs.answer.state import State
 from ctr_pvs.answer.status import NoEquilibriumError
 from ctr_pvs.answer.status import Status
 from ctr_pvs.errors import FieldError
-from ctr_pvs.kernel.walk.cold import DELICATE
 from ctr_pvs.kernel.walk.step import MORE
 from ctr_pvs.kernel.walk.step import NOT_PROVEN
 from ctr_pvs.kernel.walk.step import OK
 from ctr_pvs.pvs.printed_loads import check_renda2021
 from ctr_pvs.pvs.refine import refine_full
+from ctr_pvs.robot.loads import Loads
 from ctr_pvs.robot.robot import Robot
 from ctr_pvs.solve.batch import SEVERAL
 from ctr_pvs.solve.batch import Batch
 from ctr_pvs.solve.batch import Progress
 from ctr_pvs.solve.batch import solve_rows
 from ctr_pvs.solve.equilibria import equilibria
+from ctr_pvs.solve.journey import Command
+from ctr_pvs.solve.journey import arrive
+from ctr_pvs.solve.journey import snapped
+from ctr_pvs.solve.legs import cold_legs
+from ctr_pvs.solve.legs import load_leg
+from ctr_pvs.solve.legs import warm_legs
+from ctr_pvs.solve.packer import LoadPacker
 from ctr_pvs.solve.path import DEGREES
-from ctr_pvs.solve.path import Followed
-from ctr_pvs.solve.path import PathEnd
+from ctr_pvs.solve.path import NO_LOADS
+from ctr_pvs.solve.path import Leg
+from ctr_pvs.solve.path import deadline_of
 from ctr_pvs.solve.path import distance_to_snap
-from ctr_pvs.solve.path import travel
+from ctr_pvs.solve.path import load_to_snap
+from ctr_pvs.solve.sensing import SensedForce
+from ctr_pvs.solve.sensing import measured
+from ctr_pvs.solve.sensing import sense
 
 Array = NDArray[np.float64]
-
-#: Index of the degree at which a delicate journey is believed even if it does not agree with the one before.
-MOST_REPEATS = 4
 
 FIDELITIES = ("auto", "torsionless", "torsion", "full")
 FORCE_MODELS = ("virtual_work", "renda2021")
@@ -70,16 +81,20 @@ class EquilibriumSolver:
         self._untwisted = fidelity == "auto"
         self._engine = Engine(robot, self.tolerance)
         self._last: State | None = None
+        self._acting: Loads | None = None
+        self._packer = LoadPacker(robot, fidelity, force_model)
 
-    def follow(self, alpha: ArrayLike, D: ArrayLike, budget: float | None = None) -> Equilibrium:
-        """Go from the last good answer to (alpha, D) along the straight path, through folds: ``solve`` with a warm
-        start.
+    def follow(
+        self, alpha: ArrayLike, D: ArrayLike, budget: float | None = None, *, loads: Loads | None = None
+    ) -> Equilibrium:
+        """Go from the last good answer to (alpha, D) and ``loads`` along the straight path, through folds: ``solve``
+        with a warm start.
 
         Rotation and sliding may come together.  Where the branch ends the robot snaps: the status is SNAP, and
         ``answer.snaps`` tells for each one the fraction of the path, alpha and D there, the states before and after,
         and the energy released.
         """
-        return self.solve(alpha, D, "warm", budget)
+        return self.solve(alpha, D, "warm", budget, loads=loads)
 
     def distance_to_snap(self, budget: float | None = None, turn: float = 4.0 * np.pi) -> Array:
         """(2 N, 2) how far each actuator, alpha_1 .. alpha_N [rad] and D_1 .. D_N [m], can go from the last good answer
@@ -97,44 +112,121 @@ class EquilibriumSolver:
         lengths = np.array([tube.length for tube in self.robot.tubes])
         lowest, highest = np.append(0.0, D[:-1]), np.minimum(np.append(D[1:], np.inf), lengths)
         bounds = np.concatenate([alpha - turn, lowest]), np.concatenate([alpha + turn, highest])
-        return distance_to_snap(self._engine, state, bounds, _deadline(budget))
+        return distance_to_snap(self._engine, state, bounds, deadline_of(budget))
+
+    def load_to_snap(self, loads: Loads, budget: float | None = None, most: float = 10.0) -> float:
+        """How many times ``loads`` can act on the last good answer, beside what acts on it already, before the stable
+        branch ends; infinite if it does not up to ``most`` times, NaN where the ``budget`` [s] ran out first.
+
+        Raises ``NoEquilibriumError`` without a last good answer, ``LoadError`` for loads that the robot cannot take.
+        """
+        if self._last is None:
+            raise NoEquilibriumError("no equilibrium to start from: solve a command first")
+        packed = self._packer.pack(self._last.D, loads)
+        return load_to_snap(self._engine, self._last, packed, most, deadline_of(budget))
+
+    def sense_tip_force(
+        self,
+        alpha: ArrayLike,
+        D: ArrayLike,
+        *,
+        torque: ArrayLike | None = None,
+        force: ArrayLike | None = None,
+        tip_position: ArrayLike | None = None,
+        torque_std: ArrayLike = 1e-3,
+        force_std: ArrayLike = 0.05,
+        position_std: ArrayLike = 5e-4,
+        loads: Loads | None = None,
+        guess: ArrayLike = (0.0, 0.0, 0.0),
+        largest_std: float = 10.0,
+    ) -> SensedForce:
+        """The force on the tip [N] at (alpha, D), (N,) each, from measured actuator torques (N,) [N m] and forces (N,)
+        [N], or a measured tip position (3,) [m], with their standard deviations: see ``solve.sensing``.
+
+        loads : what else is known to act.  guess : where to start, (3,) [N].  largest_std : a direction whose standard
+        deviation would be larger [N] counts as not seen.  The warm start of ``solve`` stays as it is.
+
+        Raises ``FieldError`` for measurements that are none, and as ``solve`` does.
+        """
+        told = measured(self.robot.n_tubes, torque, force, tip_position, torque_std, force_std, position_std)
+        other = self._copy()
+        known = loads or Loads()
+
+        def solve(tip: Array) -> Equilibrium:
+            x, y, z = (tip + known.tip_force).tolist()
+            return other.solve(alpha, D, loads=replace(known, tip_force=(x, y, z)))
+
+        return sense(solve, told, np.array(guess, dtype=np.float64), largest_std)
+
+    def _copy(self) -> EquilibriumSolver:
+        """A solver that does not share the warm start, and has none."""
+        other = EquilibriumSolver.__new__(EquilibriumSolver)
+        other.__dict__.update(self.__dict__)
+        other._last, other._acting = None, None
+        return other
 
     def reset(self) -> None:
         """Forget the warm start: the next solve is cold."""
         self._last = None
 
-    def solve(self, alpha: ArrayLike, D: ArrayLike, start: str = "warm", budget: float | None = None) -> Equilibrium:
-        """The stable equilibrium at base rotations ``alpha`` (N,) [rad] and base positions ``D`` (N,) [m].
+    def solve(
+        self,
+        alpha: ArrayLike,
+        D: ArrayLike,
+        start: str = "warm",
+        budget: float | None = None,
+        *,
+        loads: Loads | None = None,
+    ) -> Equilibrium:
+        """The stable equilibrium at base rotations ``alpha`` (N,) [rad] and base positions ``D`` (N,) [m] under
+        ``loads``; None is no load, whatever acted before.
 
-        start : "warm" follows the straight path from the last good answer; "cold", and the first solve, the path from
-            the relaxed robot at this D.  Angles are not wrapped: 280 deg and -80 deg are different histories.
-            "lowest-energy" has no history: of all stable equilibria that ``equilibria`` finds, the one of least energy.
+        start : "warm" follows the straight path from the last good answer, in alpha, D and loads together; "cold", and
+            the first solve, the path from the relaxed robot at this D: the rotation, then the loads in proportion.
+            Angles are not wrapped: 280 deg and -80 deg are different histories. "lowest-energy" has no history: of all
+            stable equilibria that ``equilibria`` finds, the one of least energy; not under load.
         budget : seconds that following the path may take; past it the status is TIMEOUT.  A command near enough for
             one proven step is answered at once.
 
         The warm start stays the last good one when a solve fails.
 
-        Raises ``CommandError`` for a command that the robot cannot take, ``FieldError`` for a wrong option; both are
-        ``ValueError``.
+        Raises ``CommandError`` for a command that the robot cannot take, ``LoadError`` for loads that cannot act on it,
+        ``FieldError`` for a wrong option; all are ``ValueError``.
         """
         _check_option("start", start, ("warm", "cold", "lowest-energy"))
-        deadline = _deadline(budget)
+        deadline = deadline_of(budget)
         alpha, D = self.robot.check_command(alpha, D)
+        packed = NO_LOADS
+        if loads is not None:
+            packed = self._packer.pack(D, loads)
+            loads = loads if len(packed) else None
+        at = Command(alpha, D, loads)
         if self._level == "torsionless":
-            return self._torsionless(alpha, D)
+            return self._torsionless(at)
         if start == "lowest-energy":
-            return self._lowest(alpha, D)
+            return self._lowest(at)
         if start == "cold" or self._last is None:
-            return self._cold(alpha, D, deadline)
-        code, vector = self._engine.advance(self._last.vector, alpha, D, self._untwisted)
+            return self._cold(at, packed, deadline)
+        code, vector = self._engine.step(self._last.vector, alpha, D, packed, untwisted=self._untwisted)
+        if code == OK and missed(self._engine, vector):
+            code, vector = raised(self._engine, vector, alpha, D, packed)
         if code == OK:
-            return self._keep(alpha, D, State(vector, len(alpha)), (), 0, "")
-        return self._travelled(self._last, alpha, D, deadline, "")
+            return self._keep(at, State(vector, len(alpha)), (), 0, "")
+        legs = warm_legs(self.robot, self._last, self._acting, alpha, D, loads)
+        return self._travelled(self._last, legs, at, packed, deadline, "")
 
     def solve_batch(
-        self, alpha: ArrayLike, D: ArrayLike, start: str = "cold", progress: Progress | None = None
+        self,
+        alpha: ArrayLike,
+        D: ArrayLike,
+        start: str = "cold",
+        progress: Progress | None = None,
+        *,
+        tip_force: ArrayLike | None = None,
+        tip_moment: ArrayLike | None = None,
     ) -> Batch:
-        """Many commands at once: the answers of cold starts to the rows of ``alpha`` [rad] and ``D`` [m] (M, N).
+        """Many commands at once: the answers of cold starts to the rows of ``alpha`` [rad] and ``D`` [m] (M, N), under
+        ``tip_force`` [N] and ``tip_moment`` [N m], (M, 3) each or None.
 
         progress : called as progress(done, total) from time to time.  The warm start of ``solve`` stays as it is.
 
@@ -142,162 +234,114 @@ class EquilibriumSolver:
         real numbers with a column per tube, ``FieldError`` for a wrong option.
         """
         _check_option("start", start, ("cold",))
-        return solve_rows(self, self._engine, alpha, D, self._level, progress)
+        return solve_rows(self, self._engine, alpha, D, tip_force, tip_moment, self._level, progress)
 
-    def solve_alone(self, alpha: Array, D: Array) -> Equilibrium:
+    def solve_alone(self, alpha: Array, D: Array, loads: Loads | None) -> Equilibrium:
         """A cold start that leaves the warm start as it is; for threads of a batch."""
-        other = EquilibriumSolver.__new__(EquilibriumSolver)
-        other.__dict__.update(self.__dict__)
-        other._last = None
-        return other.solve(alpha, D, start="cold")
+        return self._copy().solve(alpha, D, start="cold", loads=loads)
 
-    def _cold(self, alpha: Array, D: Array, deadline: float) -> Equilibrium:
-        """The path from the relaxed robot at this D, where one has to be walked."""
-        code, vector = self._engine.cold_start(alpha, D, self._untwisted)
+    def _cold(self, at: Command, packed: Array, deadline: float) -> Equilibrium:
+        """The path from the relaxed robot at this D, where one has to be walked, then the loads."""
+        alpha, D, loads = at
+        code, vector = self._engine.cold_start(alpha, D, self._untwisted and loads is None)
         if code in (OK, MORE):
-            return self._keep(alpha, D, State(vector, len(alpha)), (), 0, SEVERAL if code == MORE else "")
+            state, note = State(vector, len(alpha)), SEVERAL if code == MORE else ""
+            if loads is None:
+                return self._keep(at, state, (), 0, note)
+            return self._travelled(state, [load_leg(self.robot, alpha, D, packed)], at, packed, deadline, note)
         code, vector = self._engine.relaxed(D, DEGREES[1])
         if code == NOT_PROVEN:
             message = "the search for the relaxed robot, where a cold start sets out, found no energy minimum"
-            return self._failure(alpha, D, Status.NOT_CONVERGED, message)
+            return self._failure(at, Status.NOT_CONVERGED, message)
         # A common rotation of all tubes changes nothing: begin with tube 1 where the command wants it.
         relaxed = State(vector, len(alpha)).turned_to(alpha[0])
-        return self._travelled(relaxed, alpha, D, deadline, SEVERAL if code == MORE else "")
+        legs = cold_legs(self.robot, relaxed, alpha, D, packed)
+        return self._travelled(relaxed, legs, at, packed, deadline, SEVERAL if code == MORE else "")
 
-    def _travelled(self, origin: State, alpha: Array, D: Array, deadline: float, note: str) -> Equilibrium:
-        """Travel at the lowest degree that keeps the branch up to the converged model, then settle on the degrees that
-        the tolerance asks for.
+    def _travelled(
+        self, origin: State, legs: list[Leg], at: Command, packed: Array, deadline: float, note: str
+    ) -> Equilibrium:
+        """The answer at the end of a journey."""
+        arrival = arrive(self._engine, origin, legs, packed, self._untwisted, deadline)
+        if arrival.state is None:
+            return self._failure(at, arrival.status, arrival.message, arrival.iterations)
+        return self._keep(at, arrival.state, arrival.snaps, arrival.iterations, note)
 
-        Folds lie a little elsewhere at a low degree.  A journey through one, or to the edge of one, is therefore made
-        again at the next degree, until two agree.
-        """
-        iterations, before, walked = 0, None, 0.0
-        for index, degree in enumerate(DEGREES[:-1]):
-            if index < MOST_REPEATS and degree <= walked:
-                continue  # the tolerance has asked for more already: the same journey would agree with itself
-            journey = travel(self._engine, origin, alpha, D, degree, deadline)
-            walked = self._engine.elements(journey.state.vector)[:, 3].max(initial=0.0)
-            iterations += journey.iterations
-            if journey.end is PathEnd.NO_LANDING and index < len(DEGREES) - 2:
-                continue  # a state at the edge of a fold may lie beyond the fold of a lower degree
-            if journey.end is not PathEnd.REACHED:
-                return self._failure(alpha, D, _STATUS[journey.end], _stopped(journey), iterations)
-            code, vector = self._engine.settle(journey.state.vector, self._untwisted)
-            if code != OK:
-                continue
-            delicate = bool(journey.snaps) or self._engine.margin(vector) < DELICATE
-            if not delicate or index == MOST_REPEATS or (before is not None and journey.agrees_with(before)):
-                return self._keep(alpha, D, State(vector, len(alpha)), journey.snaps, iterations, note)
-            before = journey
-        message = "the refined model lost the branch that the coarse one followed: a fold is very near this command"
-        return self._failure(alpha, D, Status.NOT_CONVERGED, message, iterations)
-
-    def _lowest(self, alpha: Array, D: Array) -> Equilibrium:
+    def _lowest(self, at: Command) -> Equilibrium:
         """The stable equilibrium of least energy, whatever path may lead there."""
+        alpha, D, loads = at
+        if loads is not None:
+            raise FieldError("start", "lowest-energy", "cold or warm where loads act", "the search knows no loads")
         every = equilibria(self.robot, alpha, D, self.tolerance)
         if every.stable:
-            code, vector = self._engine.settle(every.stable[0].state.vector, self._untwisted)
+            code, vector = settled(self._engine, every.stable[0].state.vector, NO_LOADS, self._untwisted)
             if code == OK:
                 note = f", of least energy among {len(every.stable)}; {every.method}"
-                return self._keep(alpha, D, State(vector, len(alpha)), (), 0, note)
-        return self._failure(alpha, D, Status.NO_STABLE_EQUILIBRIUM, f"none found: {every.method}")
+                return self._keep(at, State(vector, len(alpha)), (), 0, note)
+        return self._failure(at, Status.NO_STABLE_EQUILIBRIUM, f"none found: {every.method}")
 
-    def _torsionless(self, alpha: Array, D: Array) -> Equilibrium:
+    def _torsionless(self, at: Command) -> Equilibrium:
         """The closed form, with what it neglects told by its error estimate."""
-        code, vector = self._engine.untwisted(alpha, D)
+        code, vector = self._engine.untwisted(at.alpha, at.D)
         if code != OK:
             message = "the untwisted state is unstable: twist cannot be neglected here"
-            return self._failure(alpha, D, Status.NO_STABLE_EQUILIBRIUM, message)
-        return self._told(alpha, D, State(vector, len(alpha)), (), 0, "; twist is neglected")
+            return self._failure(at, Status.NO_STABLE_EQUILIBRIUM, message)
+        return self._told(at, State(vector, self.robot.n_tubes), (), 0, "; twist is neglected")
 
     def _keep(
-        self, alpha: Array, D: Array, state: State, snaps: tuple[Snap, ...], iterations: int, note: str
-    ) -> Equilibrium:
+        self, at: Command, state: State, snaps: tuple[Snap, ...], iterations: int, note: str
+    ) -> Equilibrium:  # fmt: skip
         """The answer of the level that was asked for; a good one is kept as the next warm start."""
-        if self._level == "full":
-            answer = self._full(alpha, D, state, snaps, iterations, note)
+        if self._level == "full" and at.loads is None:
+            answer = self._full(at, state, snaps, iterations, note)
         else:
-            answer = self._told(alpha, D, state, snaps, iterations, note)
+            answer = self._told(at, state, snaps, iterations, note)
         if answer.status.success:
             # Tubes that are not coupled remember nothing: what follows sets out from the relaxed robot.
-            self._last = state if state.coupled else None
+            self._last, self._acting = state if state.coupled else None, at.loads
         return answer
 
     def _full(
-        self, alpha: Array, D: Array, state: State, snaps: tuple[Snap, ...], iterations: int, note: str
-    ) -> Equilibrium:
+        self, at: Command, state: State, snaps: tuple[Snap, ...], iterations: int, note: str
+    ) -> Equilibrium:  # fmt: skip
         refined = refine_full(TorsionShape(self._engine, state), self.tolerance)
         if refined is None:
             message = "Newton at the full level does not converge from the torsion equilibrium"
-            return self._failure(alpha, D, Status.NOT_CONVERGED, message, iterations)
+            return self._failure(at, Status.NOT_CONVERGED, message, iterations)
         status, message = self._outcome(refined.estimate, snaps, note)
         answer = FullEquilibrium(
-            self._engine, alpha, D, status, message, "full", self.force_model, state,
+            self._engine, at.alpha, at.D, status, message, "full", self.force_model, state,
             iterations + state.steps + refined.iterations, snaps,
         )  # fmt: skip
         answer.refined = refined
         return answer
 
     def _told(
-        self, alpha: Array, D: Array, state: State, snaps: tuple[Snap, ...], iterations: int, note: str
-    ) -> Equilibrium:
+        self, at: Command, state: State, snaps: tuple[Snap, ...], iterations: int, note: str
+    ) -> Equilibrium:  # fmt: skip
         """The answer, with its status and message."""
         status, message = Status.OK, "stable equilibrium"
         if snaps or note or state.estimate > self.tolerance:
             status, message = self._outcome(state.estimate, snaps, note)
-        level = "torsion" if state.twists else "torsionless"
+        level = "full" if at.loads is not None else "torsion" if state.twists else "torsionless"
         return Equilibrium(
-            self._engine, alpha, D, status, message, level, self.force_model, state, iterations + state.steps, snaps
-        )
+            self._engine, at.alpha, at.D, status, message, level, self.force_model, state, iterations + state.steps,
+            snaps, at.loads,
+        )  # fmt: skip
 
     def _outcome(self, estimate: float, snaps: tuple[Snap, ...], note: str) -> tuple[Status, str]:
         if estimate > self.tolerance:
             needed = f"{self.tolerance:.1e} m were asked for"
             return Status.TOLERANCE_MISSED, f"tip error about {estimate:.1e} m at the {self._level} level, {needed}"
-        return (Status.SNAP, _snapped(snaps) + note) if snaps else (Status.OK, "stable equilibrium" + note)
+        return (Status.SNAP, snapped(snaps) + note) if snaps else (Status.OK, "stable equilibrium" + note)
 
-    def _failure(self, alpha: Array, D: Array, status: Status, message: str, iterations: int = 0) -> Equilibrium:
+    def _failure(self, at: Command, status: Status, message: str, iterations: int = 0) -> Equilibrium:
         return Equilibrium(
-            self._engine, alpha, D, status, message, self._level, self.force_model, iterations=iterations
-        )
-
-
-_STATUS = {
-    PathEnd.TIMEOUT: Status.TIMEOUT,
-    PathEnd.NO_LANDING: Status.NO_STABLE_EQUILIBRIUM,
-    PathEnd.TOO_MANY_SNAPS: Status.NOT_CONVERGED,
-}
-
-
-def _stopped(journey: Followed) -> str:
-    place = _place(journey.state.alpha, journey.state.D)
-    return f"{journey.end.value}: stopped at {journey.t:.6g} of the path, {place}"
-
-
-def _snapped(snaps: tuple[Snap, ...]) -> str:
-    """What happened on the way, for people; ``Equilibrium.snaps`` has the states."""
-    last = snaps[-1]
-    many = "snapped" if len(snaps) == 1 else f"snapped {len(snaps)} times, the last time"
-    released = sum(snap.energy_released for snap in snaps)
-    return (
-        f"{many} at {last.t:.6g} of the path, {_place(last.alpha, last.D)}, releasing {released:.3g} J in all; "
-        "the landing is a prediction, real snaps are dynamic"
-    )
-
-
-def _place(alpha: Array, D: Array) -> str:
-    angles = ", ".join(f"{angle:.6g}" for angle in alpha)
-    lengths = ", ".join(f"{length:.6g}" for length in D)
-    return f"alpha = [{angles}] rad, D = [{lengths}] m"
+            self._engine, at.alpha, at.D, status, message, self._level, self.force_model, iterations=iterations,
+            loads=at.loads,
+        )  # fmt: skip
 
 
 def _check_option(name: str, value: str, choices: tuple[str, ...]) -> None:
     if value not in choices:
         raise FieldError(name, value, f"one of {', '.join(choices)}")
-
-
-def _deadline(budget: float | None) -> float:
-    """``time.monotonic()`` value after which to give up."""
-    if budget is not None and not budget > 0.0:
-        raise FieldError("budget", budget, "seconds above 0, or None")
-    return np.inf if budget is None else time.monotonic() + budget
