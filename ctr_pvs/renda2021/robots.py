@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ctr_pvs.robot.cross_section import annulus_stiffness
 from ctr_pvs.robot.robot import Robot
 from ctr_pvs.robot.robot import Segment
 from ctr_pvs.robot.robot import Tube
-from ctr_pvs.robot.robot import annulus_stiffness
 
 YOUNGS_MODULUS = 58.0e9  # Pa, Table I
 SHEAR_MODULUS = 21.5e9  # Pa, Table I
