@@ -3,8 +3,8 @@
 A subcommand is two functions here, one that declares its arguments and one that runs it and returns an exit code.
 Bad input is one line on standard error; standard output is for answers only.
 
-What solves is imported by the function that needs it, after the words and the robot file have been found right: it
-brings the compiler along, which takes longer than all the rest.
+What solves is imported by the function that needs it, after the words, the robot file and the loads have been found
+right: it brings the compiler along, which takes longer than all the rest.
 """
 
 from __future__ import annotations
@@ -20,6 +20,8 @@ from typing import TYPE_CHECKING
 from typing import NoReturn
 
 from ctr_pvs.answer.status import Status
+from ctr_pvs.cli.loads import declare_loads
+from ctr_pvs.cli.loads import loads_in
 from ctr_pvs.cli.report import answer_as_json
 from ctr_pvs.cli.report import answer_as_text
 from ctr_pvs.cli.stability import declare_stability
@@ -30,6 +32,7 @@ from ctr_pvs.cli.words import whole_number
 from ctr_pvs.errors import FieldError
 from ctr_pvs.errors import RobotFileError
 from ctr_pvs.robot.file import load_robot
+from ctr_pvs.robot.loads import check_loads
 
 if TYPE_CHECKING:
     from ctr_pvs.answer.equilibrium import Equilibrium
@@ -116,24 +119,29 @@ def _declare_solve(subcommands: argparse._SubParsersAction[_Parser]) -> None:
         help="poses along the backbone, in --json (%(default)s)",
     )
     solve.add_argument("--json", action="store_true", help="print the answer as JSON, in SI units")
+    declare_loads(solve)
     solve.set_defaults(run=_solve)
 
 
 def _solve(arguments: argparse.Namespace) -> int:
     robot = load_robot(arguments.robot)
+    angles = [math.radians(angle) for angle in arguments.alpha] if arguments.degrees else arguments.alpha
+    alpha, D = robot.check_command(angles, arguments.D)
+    loads = loads_in(arguments, robot)
+    if loads is not None:
+        check_loads(robot, D, loads)
 
     from ctr_pvs.solve.solver import EquilibriumSolver
 
-    alpha = [math.radians(angle) for angle in arguments.alpha] if arguments.degrees else arguments.alpha
     solver = EquilibriumSolver(
         robot,
         tolerance=arguments.tolerance,
         fidelity=arguments.fidelity,
         force_model=arguments.force_model,
     )
-    equilibrium = solver.solve(alpha, arguments.D, start=arguments.start)
+    equilibrium = solver.solve(alpha, D, loads=loads, start=arguments.start)
     if arguments.json:
-        print(answer_as_json(equilibrium, arguments.poses))
+        print(answer_as_json(robot, equilibrium, arguments.poses))
     else:
         print(answer_as_text(robot, equilibrium, arguments.degrees))
     return _exit_code(equilibrium)

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 
 from ctr_pvs.answer.backbone import Pose
 from ctr_pvs.answer.status import NoEquilibriumError
+from ctr_pvs.cli.loads import loads_as_json
+from ctr_pvs.cli.loads import loads_as_line
 from ctr_pvs.renda2021.columns import aligned
 from ctr_pvs.robot.robot import Robot
 
@@ -27,12 +29,14 @@ KINK_NOTE = (
     "A segment boundary or a tip sits on the orifice or on another boundary: any force within the interval holds the\n"
     "tube, and the one shown under force is for a motion towards +D."
 )
+BASE_NOTE = "The base wrench is what the part beyond the orifice exerts there; the guide holds against it."
 
 
-def answer_as_json(equilibrium: Equilibrium, poses: int) -> str:
+def answer_as_json(robot: Robot, equilibrium: Equilibrium, poses: int) -> str:
     """One line of strict JSON in SI units, with null for what is not known.
 
     Args:
+        robot: of which it is the equilibrium.
         equilibrium: solved or not.
         poses: number of backbone poses; twists are given at the same arc lengths.
     """
@@ -53,6 +57,13 @@ def answer_as_json(equilibrium: Equilibrium, poses: int) -> str:
         "residual": lambda: equilibrium.residual,
         "iterations": lambda: equilibrium.iterations,
         "energy": lambda: equilibrium.energy,
+        "potential": lambda: equilibrium.potential,
+        "loads": lambda: loads_as_json(robot, equilibrium.applied_loads),
+        "base_wrench": lambda: _wrench(equilibrium),
+        "jacobian": lambda: equilibrium.jacobian,
+        "compliance": lambda: equilibrium.compliance,
+        "force_interval_reversed": lambda: equilibrium.force_interval_reversed,
+        "warnings": lambda: _warnings(robot, equilibrium),
     }
     return json.dumps({key: _strict(_known(part)) for key, part in parts.items()}, allow_nan=False)
 
@@ -76,10 +87,12 @@ def answer_as_text(robot: Robot, equilibrium: Equilibrium, degrees: bool) -> str
         "",
         *aligned(_header(equilibrium, degrees), *_rows(robot, equilibrium, degrees)),
         LOAD_NOTE,
-        *([KINK_NOTE] if equilibrium.kink else []),
+        *([KINK_NOTE] if (equilibrium.loads.kink & ~equilibrium.force_interval_reversed).any() else []),
+        *_warnings(robot, equilibrium),
         "",
+        *_external(robot, equilibrium),
         f"stability margin {equilibrium.stability_margin:.4f} (below 0 unstable, 0 at a snap, at most 1)",
-        f"elastic energy {equilibrium.energy:.6g} J",
+        _energy(equilibrium),
         f"{equilibrium.fidelity} model, {equilibrium.degrees_of_freedom} degrees of freedom, "
         f"{equilibrium.iterations} iterations, residual {equilibrium.residual:.1e} rad, "
         f"estimated tip error {1e3 * equilibrium.error_estimate:.1e} mm",
@@ -93,6 +106,45 @@ def _known(part: Callable[[], Any]) -> Any:
         return part()
     except NoEquilibriumError:
         return None
+
+
+def _external(robot: Robot, equilibrium: Equilibrium) -> list[str]:
+    """Lines about external loads; none without any."""
+    loads = equilibrium.applied_loads
+    if loads is None or loads.is_none:
+        return []
+    wrench = equilibrium.base_wrench
+    return [
+        f"external loads   {loads_as_line(robot, loads)}",
+        f"base force       {_components('xyz', wrench.force, 4)}  N",
+        f"base moment      {_components('xyz', wrench.moment, 6)}  N m",
+        BASE_NOTE,
+        "",
+    ]
+
+
+def _energy(equilibrium: Equilibrium) -> str:
+    """The elastic energy, and that less the work of the loads where these make it another and have a potential."""
+    energy, potential = equilibrium.energy, equilibrium.potential
+    with_loads = math.isfinite(potential) and potential != energy
+    return f"elastic energy {energy:.6g} J" + (f", potential with the loads {potential:.6g} J" if with_loads else "")
+
+
+def _warnings(robot: Robot, equilibrium: Equilibrium) -> list[str]:
+    """What a reader of the numbers should not overlook, a line each; none without an equilibrium."""
+    reversed_ = _known(lambda: equilibrium.force_interval_reversed)
+    if reversed_ is None:
+        return []
+    return [
+        f"tube {tube.name}: the force interval is reversed, a concave kink: no constant force holds the tube here"
+        for tube, concave in zip(robot.tubes, reversed_, strict=True)
+        if concave
+    ]
+
+
+def _wrench(equilibrium: Equilibrium) -> dict[str, Any]:
+    wrench = equilibrium.base_wrench
+    return {"force": wrench.force, "moment": wrench.moment}
 
 
 def _pose(pose: Pose) -> dict[str, Any]:
