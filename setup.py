@@ -30,7 +30,7 @@ setup(
     entry_points={
         "console_scripts": [
             "ctr-pvs = ctr_pvs.cli.main:main",
-            "equilibrium_node = ctr_pvs_ros.node:main",
+            "equilibrium_node = ctr_pvs_ros.executable:main",
             "sweep_demo = ctr_pvs_ros.demo:main",
         ],
     },

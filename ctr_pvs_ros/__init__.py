@@ -1,7 +1,8 @@
-"""The ROS 2 node around ctr_pvs: parameters, commands, stream, outputs, report, node; service beside it.
+"""The ROS 2 node around ctr_pvs: parameters, inputs, commands, wrenches, stream, outputs, report, node; and a service.
 
-That is the order in which a command travels. commands, stream, outputs and turns hold the decisions and know nothing of
-ROS; messages, forms and markers make what is sent; node wires them to topics. The service has a process of its own.
+That is the order in which a command travels. commands, wrenches, external_load, stream, outputs and turns hold the
+decisions and know nothing of ROS; messages, forms and markers make what is sent; inputs and publishers are the topics,
+node wires them together, executable runs it. The service has a process of its own.
 """
 
 import os

@@ -1,4 +1,4 @@
-"""From equilibria to ROS messages; pure conversions."""
+"""Between ROS messages and what the solver knows; pure conversions."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from geometry_msgs.msg import Pose
 from geometry_msgs.msg import PoseArray
 from geometry_msgs.msg import PoseStamped
 from geometry_msgs.msg import Quaternion
+from geometry_msgs.msg import Wrench
 from numpy.typing import NDArray
 from rclpy.clock import Clock
 from sensor_msgs.msg import JointState
@@ -18,6 +19,7 @@ from std_msgs.msg import Header
 from std_msgs.msg import MultiArrayDimension
 
 from ctr_pvs import Backbone
+from ctr_pvs.robot.loads import Vector
 from ctr_pvs_ros.commands import joint_positions
 
 if TYPE_CHECKING:
@@ -30,6 +32,12 @@ def receipt_header(header: Header, clock: Clock, frame_id: str) -> Header:
     if stamp.sec == 0 and stamp.nanosec == 0:
         stamp = clock.now().to_msg()
     return Header(stamp=stamp, frame_id=frame_id)
+
+
+def vectors_of(wrench: Wrench) -> tuple[Vector, Vector]:
+    """Force [N] and moment [N m] of a Wrench."""
+    force, moment = wrench.force, wrench.torque
+    return (force.x, force.y, force.z), (moment.x, moment.y, moment.z)
 
 
 def pose_of(position: NDArray[np.float64], orientation: NDArray[np.float64]) -> Pose:

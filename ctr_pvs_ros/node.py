@@ -1,4 +1,4 @@
-"""The node ctr_equilibrium: commands in on servo_jp, equilibria out; a service beside it.
+"""The node ctr_equilibrium: commands and loads in, equilibria out; a service beside it.
 
 What solves is imported when the first solver is made, after the robot file and the commands in parameters have been
 found right: it brings the compiler along, which takes longer than all the rest of a start.
@@ -6,8 +6,6 @@ found right: it brings the compiler along, which takes longer than all the rest 
 
 from __future__ import annotations
 
-import gc
-import signal
 import threading
 import time
 import traceback
@@ -15,29 +13,16 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 from typing import Any
 
-import rclpy
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PoseArray
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import WrenchStamped
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock
 from rclpy.clock import ClockType
-from rclpy.duration import Duration
-from rclpy.exceptions import ParameterException
-from rclpy.executors import Executor
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.qos import DurabilityPolicy
-from rclpy.qos import QoSProfile
-from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64
-from std_msgs.msg import Float64MultiArray
 from std_msgs.msg import Header
-from visualization_msgs.msg import MarkerArray
 
 import ctr_pvs
 from ctr_pvs import load_robot
@@ -48,36 +33,28 @@ from ctr_pvs_ros.commands import CommandReader
 from ctr_pvs_ros.commands import Leniency
 from ctr_pvs_ros.commands import RejectedCommand
 from ctr_pvs_ros.commands import narrowed
-from ctr_pvs_ros.forms import Forms
-from ctr_pvs_ros.markers import TubeMarkers
-from ctr_pvs_ros.outputs import Output
-from ctr_pvs_ros.outputs import Outputs
-from ctr_pvs_ros.outputs import Picture
+from ctr_pvs_ros.external_load import ExternalLoad
+from ctr_pvs_ros.inputs import Inputs
 from ctr_pvs_ros.outputs import Sent
 from ctr_pvs_ros.parameters import ParameterError
 from ctr_pvs_ros.parameters import Settings
+from ctr_pvs_ros.publishers import Publishers
 from ctr_pvs_ros.report import Report
 from ctr_pvs_ros.serialized import stamp_bytes
 from ctr_pvs_ros.service_process import ServiceProcess
 from ctr_pvs_ros.stream import Policy
 from ctr_pvs_ros.stream import Stream
+from ctr_pvs_ros.wrenches import RejectedWrench
+from ctr_pvs_ros.wrenches import WrenchReader
 
 if TYPE_CHECKING:
     from ctr_pvs import EquilibriumSolver
     from ctr_pvs.kernel.compiler import Background
 
 NODE_NAME = "ctr_equilibrium"
-EXIT_BAD_INPUT = 2
-# What a wrong parameter, robot file, or ROS argument (rclpy's RCLError is a RuntimeError) ends in.
-START_FAULTS = (ParameterException, RuntimeError, ValueError)
 LOG_PERIOD = 2.0  # s; at most one line of a kind in this time
-WAKE_PERIOD = 0.1  # s; a signal is seen at the latest after this time
 CATCH_UP_PERIOD = 0.05  # s; late joiners wait no longer, and markers move no faster
-LAST_WORD = Duration(seconds=0.2)  # for viewers to hear that the tubes are gone
 LOADING_TIME = 1.0  # s; kernels that are being loaded when the node ends are waited for so long
-
-NEWEST_WINS = QoSProfile(depth=1)
-LATE_JOINERS_SEE_THE_LAST = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class EquilibriumNode(Node):
@@ -105,14 +82,16 @@ class EquilibriumNode(Node):
         self._reader = self._new_reader(self._settings)
         initial = self._initial_command()
         self._stream = Stream(self._new_solver())
-        self._report = Report()
+        self._wrench_reader = WrenchReader(self._settings.frame_id, self._settings.tip_frame_id)
+        self._load: ExternalLoad[Time] = ExternalLoad()
+        self._report = Report(self._load if self._settings.use_external_wrench else None)
 
-        self._outputs = self._new_outputs()
+        self._outputs = Publishers(self, self._robot, self._settings)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 1)
         self._service = ServiceProcess(self, self._settings)
         if initial is not None:
-            self._guarded(self._solve)(initial, self.get_clock().now().to_msg())
-        self.create_subscription(JointState, "servo_jp", self._guarded(self._on_message), NEWEST_WINS)
+            self._guarded(self._follow)(initial, self.get_clock().now().to_msg())
+        self._inputs = Inputs(self, self._on_messages, self._guarded, self._settings.use_external_wrench)
         # Both go on while simulated time stands still.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._diagnostics_due: float | None = None  # since when, on a steady clock [s]
@@ -128,7 +107,6 @@ class EquilibriumNode(Node):
         stopping = threading.Thread(target=self.compiling.stop)  # which takes its time, as do the others
         stopping.start()
         self._outputs.clear()
-        self._markers.wait_for_all_acked(LAST_WORD)
         self._service.stop()
         stopping.join()
         self.compiling.wait(LOADING_TIME)
@@ -161,26 +139,6 @@ class EquilibriumNode(Node):
         except ValueError as error:
             raise ParameterError(f"parameters rotation_limits, translation_limits: {error}") from error
 
-    def _new_outputs(self) -> Outputs:
-        frame = self._settings.frame_id
-        forms, tubes = Forms(self._reader.names, frame), TubeMarkers(self._robot, frame)
-        outputs = [
-            self._output(Float64, "stability_margin", lambda sent: forms.margin(sent.equilibrium)),
-            self._output(JointState, "setpoint_js", lambda sent: forms.joints(sent.equilibrium, sent.stamp)),
-            self._output(PoseStamped, "setpoint_cp", lambda sent: forms.tip(sent.equilibrium, sent.stamp)),
-            self._output(PoseArray, "backbone", lambda sent: forms.backbone(sent.backbone, sent.stamp)),
-        ]
-        if self._settings.publish_backbone_s:
-            outputs.append(
-                self._output(Float64MultiArray, "backbone_s", lambda sent: messages.arc_length_of(sent.backbone))
-            )
-        self._markers = self.create_publisher(MarkerArray, "markers", LATE_JOINERS_SEE_THE_LAST)
-        picture = Picture(self._markers, lambda sent: tubes.of(sent.equilibrium, sent.stamp), tubes.none)
-        return Outputs(outputs, picture)
-
-    def _output(self, message_type: type, topic: str, encode: Callable[[Sent], Any]) -> Output:
-        return Output(self.create_publisher(message_type, topic, LATE_JOINERS_SEE_THE_LAST), encode)
-
     def _initial_command(self) -> Command | None:
         values = self._settings.initial_command
         if not values:
@@ -209,12 +167,36 @@ class EquilibriumNode(Node):
 
         return guarded
 
-    def _on_message(self, message: JointState) -> None:
-        self._on_command(message)
+    def _on_messages(self, joints: JointState | None, wrench: WrenchStamped | None) -> None:
+        self._answer(joints, wrench)
         # Diagnostics take longer than an answer. Begun here, they cost a command only if they last until the second
         # one from now comes, which would overtake the first.
         if self._diagnostics_due is not None:
             self._publish_diagnostics()
+
+    def _answer(self, joints: JointState | None, wrench: WrenchStamped | None) -> None:
+        """Solve once for all that came. The answer has the command's stamp; the wrench's, where it alone is good."""
+        if wrench is not None:
+            self._on_wrench(wrench)
+        if joints is not None:
+            self._on_command(joints)
+        load, last = self._load, self._stream.last
+        # A load is kept for the command to come while there is no answer yet, or commands are refused after a snap.
+        if load.unanswered is not None and last is not None and not self._stream.stopped:
+            self._solve(last, load.unanswered)
+
+    def _on_wrench(self, message: WrenchStamped) -> None:
+        stamp, _ = self._stamp_for(message.header.stamp)
+        try:
+            wrench = self._wrench_reader.read(message.header.frame_id, *messages.vectors_of(message.wrench))
+        except RejectedWrench as rejection:
+            self._load.rejected(rejection)
+            self.get_logger().warning(
+                f"wrench rejected: {rejection.reason.value}: {rejection}; the last load is held",
+                throttle_duration_sec=LOG_PERIOD,
+            )
+        else:
+            self._load.accept(wrench, stamp, self._stream.orientation)
 
     def _on_command(self, message: JointState) -> None:
         stamp, age = self._stamp_for(message.header.stamp)
@@ -222,8 +204,7 @@ class EquilibriumNode(Node):
         settings = self._settings
         leniency = Leniency(settings.merge_partial, settings.clamp_to_limits, settings.accept_nameless)
         try:
-            command = self._reader.read(message.name, message.position, leniency, self._stream.last)
-            self._solve(command, stamp)
+            self._follow(self._reader.read(message.name, message.position, leniency, self._stream.last), stamp)
         except RejectedCommand as rejection:
             self._report.rejected(rejection)
             self.get_logger().warning(
@@ -231,30 +212,37 @@ class EquilibriumNode(Node):
             )
 
     def _stamp_for(self, stamp: Time) -> tuple[Time, float | None]:
-        """The stamp of all that answers a command, and the command's age at receipt [s]; None: it had a zero stamp."""
+        """The stamp of all that answers a message, and the message's age at receipt [s]; None: it had a zero stamp."""
         now = self.get_clock().now()
         sent = stamp.sec * 1_000_000_000 + stamp.nanosec
         if sent == 0:
             return now.to_msg(), None
         return stamp, (now.nanoseconds - sent) * 1e-9
 
+    def _follow(self, command: Command, stamp: Time) -> None:
+        """Answer a new command."""
+        self._solve(command, stamp)
+        self._report.accepted(command)
+        if command.notes:
+            text = "command clamped: " + "; ".join(command.notes)
+            self.get_logger().warning(text, throttle_duration_sec=LOG_PERIOD)
+
     def _solve(self, command: Command, stamp: Time) -> None:
+        """Solve under the load that acts, and let the answer go where it may."""
         settings = self._settings
         policy = Policy(settings.on_snap, settings.margin_warn, settings.margin_stop)
         self.solving = True
         try:
             if self.interrupted:  # the signal came before there was a solve for it to end
                 raise KeyboardInterrupt
-            answer = self._stream.follow(command, policy, settings.compute_budget)
+            answer = self._stream.follow(command, policy, settings.compute_budget, self._load.loads)
         finally:
             self.solving = False
+        self._load.solved(self._stream.orientation)
         if answer.verdict.publish:
             stamped = stamp_bytes(stamp.sec, stamp.nanosec)
             self._outputs.publish(Sent(answer.equilibrium, stamped, settings.backbone_poses))
-        self._report.answered(command, answer)
-        if command.notes:
-            text = "command clamped: " + "; ".join(command.notes)
-            self.get_logger().warning(text, throttle_duration_sec=LOG_PERIOD)
+        self._report.answered(answer)
         if not answer.verdict.publish:
             self.get_logger().error(answer.verdict.remark, throttle_duration_sec=LOG_PERIOD)
         elif answer.verdict.remark:
@@ -275,7 +263,8 @@ class EquilibriumNode(Node):
     def _publish_diagnostics(self) -> None:
         self._diagnostics_due = None
         name = f"{self.get_fully_qualified_name().lstrip('/')}: equilibrium"
-        status = self._report.status(name, self._robot.name, self._settings.command_timeout)
+        settings = self._settings
+        status = self._report.status(name, self._robot.name, settings.command_timeout, settings.wrench_timeout)
         header = Header(stamp=self.get_clock().now().to_msg())
         self._diagnostics.publish(DiagnosticArray(header=header, status=[status]))
 
@@ -292,61 +281,3 @@ class EquilibriumNode(Node):
         self._service.update(self._settings)
         if any(parameter.name == "on_snap" for parameter in changed):
             self._stream.release()
-
-
-def main(args: list[str] | None = None) -> int:
-    """Entry point of the executable equilibrium_node; returns its exit code."""
-    node = None
-
-    def end(number: int, frame: object) -> None:
-        """Instead of rclpy's handler: either signal also ends a solve that is under way. Elsewhere the executor would
-        log an exception, so there the node ends as soon as the executor comes round."""
-        if node is None:
-            raise KeyboardInterrupt
-        node.interrupted = True
-        if node.solving:
-            raise KeyboardInterrupt
-
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, end)
-    try:
-        try:
-            rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-            node = EquilibriumNode()
-        except START_FAULTS as error:
-            get_logger(NODE_NAME).fatal(f"not started: {error}")
-            return EXIT_BAD_INPUT
-        _spin(node)
-    except KeyboardInterrupt:
-        pass
-    finally:
-        # A second signal must not turn a clean end into a failure.
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, signal.SIG_IGN)
-        if node is not None:
-            node.destroy_node()
-        rclpy.try_shutdown()
-    return 0
-
-
-def _spin(node: EquilibriumNode) -> None:
-    # What is there by now stays: the garbage collector need not look through it again while commands wait.
-    gc.collect()
-    gc.freeze()
-    executor = _new_executor()
-    executor.add_node(node)
-    while rclpy.ok() and not node.interrupted:
-        executor.spin_once(timeout_sec=WAKE_PERIOD)
-
-
-def _new_executor() -> Executor:
-    """The quickest one there is: docs/node_latency.md. The first rclpy of Jazzy has no EventsExecutor."""
-    try:
-        from rclpy.experimental.events_executor import EventsExecutor
-    except ImportError:
-        return SingleThreadedExecutor()
-    return EventsExecutor()
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -15,6 +15,9 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 MAX_BACKBONE_POSES = 10_000
+#: Where external loads can act.
+LOADED_FIDELITIES = ("auto", "full")
+LOADED_FORCE_MODELS = ("virtual_work",)
 
 
 @dataclass(frozen=True)
@@ -23,16 +26,19 @@ class Settings:
 
     robot_file: str
     frame_id: str
+    tip_frame_id: str
     tolerance: float
     fidelity: str
     force_model: str
     initial_command: tuple[float, ...]
     publish_backbone_s: bool
+    use_external_wrench: bool
     backbone_poses: int
     rotation_limits: tuple[float, ...]
     translation_limits: tuple[float, ...]
     on_snap: str
     command_timeout: float
+    wrench_timeout: float
     compute_budget: float
     merge_partial: bool
     clamp_to_limits: bool
@@ -56,6 +62,9 @@ PARAMETERS: dict[str, ParameterRule] = {
     "robot_file": ParameterRule("", "Path of the robot file (YAML). Required.", read_only=True),
     "frame_id": ParameterRule(
         "ctr_base", "Frame of all poses: origin at the insertion orifice, +x along the insertion.", read_only=True
+    ),
+    "tip_frame_id": ParameterRule(
+        "ctr_tip", "Frame of the tip, for wrenches: that of the pose on setpoint_cp.", read_only=True
     ),
     "tolerance": ParameterRule(
         1e-5, "Largest estimated tip error of an answer [m].", bounds=(1e-10, 1.0), read_only=True
@@ -81,6 +90,9 @@ PARAMETERS: dict[str, ParameterRule] = {
     "publish_backbone_s": ParameterRule(
         False, "Publish the arc length of each backbone pose [m] on backbone_s.", read_only=True
     ),
+    "use_external_wrench": ParameterRule(
+        False, "Take the external load on the tip [N, N m] from external_wrench.", read_only=True
+    ),
     "backbone_poses": ParameterRule(
         60, "Number of poses on the backbone, both ends included.", bounds=(2, MAX_BACKBONE_POSES)
     ),
@@ -102,6 +114,11 @@ PARAMETERS: dict[str, ParameterRule] = {
     ),
     "command_timeout": ParameterRule(
         0.0, "Diagnostics say stale when no command came for this long [s]; 0: never.", bounds=(0.0, 86400.0)
+    ),
+    "wrench_timeout": ParameterRule(
+        0.0,
+        "Diagnostics warn when no wrench came for this long, and the last load is held [s]; 0: never.",
+        bounds=(0.0, 86400.0),
     ),
     "compute_budget": ParameterRule(1.0, "Wall-clock limit of one solve [s].", bounds=(1e-4, 60.0)),
     "merge_partial": ParameterRule(
@@ -171,9 +188,23 @@ def _check(settings: Settings) -> None:
             raise ParameterError(f"parameter {name}: expected one of {', '.join(rule.choices)}, got {value!r}")
     if not settings.robot_file:
         raise ParameterError("parameter robot_file: expected the path of a robot file, got nothing")
+    if settings.tip_frame_id in ("", settings.frame_id):
+        other = f"a name other than frame_id ({settings.frame_id!r})"
+        raise ParameterError(f"parameter tip_frame_id: expected {other}, got {settings.tip_frame_id!r}")
+    if settings.use_external_wrench:
+        _check_takes_loads(settings)
     for name in ARRAYS:
         if not all(map(math.isfinite, getattr(settings, name))):
             raise ParameterError(f"parameter {name}: expected finite numbers, got {getattr(settings, name)}")
     if settings.margin_stop > settings.margin_warn:
         limit = f"at most margin_warn ({settings.margin_warn:g})"
         raise ParameterError(f"parameter margin_stop: expected {limit}, got {settings.margin_stop:g}")
+
+
+def _check_takes_loads(settings: Settings) -> None:
+    """Bending is free under load, and eq. (41) knows no loads: the solver would refuse every one."""
+    for name, loaded in (("fidelity", LOADED_FIDELITIES), ("force_model", LOADED_FORCE_MODELS)):
+        value = getattr(settings, name)
+        if value not in loaded:
+            rule = f"{' or '.join(loaded)} where use_external_wrench is set"
+            raise ParameterError(f"parameter {name}: expected {rule}, got {value!r}")

@@ -6,14 +6,17 @@ import time
 from collections import Counter
 from collections import deque
 from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from diagnostic_msgs.msg import KeyValue
 
+from ctr_pvs import NoEquilibriumError
 from ctr_pvs import Status
 from ctr_pvs_ros.commands import Command
 from ctr_pvs_ros.commands import RejectedCommand
+from ctr_pvs_ros.external_load import ExternalLoad
 from ctr_pvs_ros.stream import Answer
 
 if TYPE_CHECKING:
@@ -23,9 +26,14 @@ SOLVE_TIMES_KEPT = 1000
 
 
 class Report:
-    """Counts what happens to commands. Times are judged by receipt on a steady clock."""
+    """Counts what happens to commands. Times are judged by receipt on a steady clock.
 
-    def __init__(self) -> None:
+    Args:
+        load: keeps the account of wrenches; None where none are listened to.
+    """
+
+    def __init__(self, load: ExternalLoad[Any] | None = None) -> None:
+        self._load = load
         self._counts = Counter(received=0, accepted=0, published=0, rejected=0, clamped=0, snaps=0, zero_stamps=0)
         self._reasons: Counter[str] = Counter()
         self._solve_times: deque[float] = deque(maxlen=SOLVE_TIMES_KEPT)
@@ -60,12 +68,11 @@ class Report:
         self._fault = text
         self._faults += 1
 
-    def answered(self, command: Command, answer: Answer) -> None:
-        """The command was accepted and solved, and its answer sent where the verdict says so."""
+    def answered(self, answer: Answer) -> None:
+        """A command or a wrench was solved for, and the answer sent where the verdict says so."""
         self._answer = answer
         self._fault = ""
         self._solve_times.append(answer.solve_time)
-        self._counts["accepted"] += 1
         self._counts["published"] += answer.verdict.publish
         if answer.equilibrium.status is Status.SNAP:
             self._counts["snaps"] += 1
@@ -74,16 +81,22 @@ class Report:
             self._published = answer.equilibrium
         if answer.verdict.remark:
             self._news = answer.verdict.remark
+
+    def accepted(self, command: Command) -> None:
+        """The command was one to solve for."""
+        self._counts["accepted"] += 1
         if command.notes:
             self._counts["clamped"] += 1
             self._last_clamp = "; ".join(command.notes)
             self._news = f"command clamped: {self._last_clamp}"
 
-    def status(self, name: str, hardware_id: str, command_timeout: float) -> DiagnosticStatus:
+    def status(
+        self, name: str, hardware_id: str, command_timeout: float, wrench_timeout: float = 0.0
+    ) -> DiagnosticStatus:
         """The state since start-up; what is over by now warns once, in the first status after it."""
-        level, message = self._summary(command_timeout)
+        level, message = self._summary(command_timeout, wrench_timeout)
         self._news = ""
-        values = self._count_values() | self._answer_values()
+        values = self._count_values() | self._load_values() | self._answer_values()
         return DiagnosticStatus(
             level=level,
             name=name,
@@ -92,7 +105,8 @@ class Report:
             values=[KeyValue(key=key, value=value) for key, value in values.items()],
         )
 
-    def _summary(self, command_timeout: float) -> tuple[bytes, str]:
+    def _summary(self, command_timeout: float, wrench_timeout: float) -> tuple[bytes, str]:
+        of_the_load = self._load.remark(wrench_timeout) if self._load is not None else ""
         if self._fault:
             return DiagnosticStatus.ERROR, f"internal error: {self._fault}; the last answer stays"
         if self._answer is not None and not self._answer.verdict.publish:
@@ -101,8 +115,8 @@ class Report:
         if command_timeout > 0.0 and age > command_timeout:
             return DiagnosticStatus.STALE, f"no command for {age:.1f} s (command_timeout is {command_timeout:g} s)"
         remark = self._news or (self._answer.verdict.remark if self._answer is not None else "")
-        if remark:
-            return DiagnosticStatus.WARN, remark
+        if remark or of_the_load:
+            return DiagnosticStatus.WARN, "; ".join(filter(None, (remark, of_the_load)))
         return DiagnosticStatus.OK, "waiting for the first command" if self._answer is None else "ok"
 
     def _age(self) -> float:
@@ -134,6 +148,9 @@ class Report:
             "last command's stamp age at receipt [s]": f"{self._header_age:.6f}",
         }
 
+    def _load_values(self) -> dict[str, str]:
+        return self._load.values() if self._load is not None else {}
+
     def _answer_values(self) -> dict[str, str]:
         if self._answer is None:
             return {}
@@ -143,7 +160,7 @@ class Report:
             "last status": equilibrium.status.value,
             "last message": equilibrium.message,
             "stability margin": f"{equilibrium.stability_margin:.6g}",
-            "snap reserve": f"{equilibrium.snap_reserve:.4g}" if equilibrium.success else "",
+            "snap reserve": _snap_reserve(equilibrium),
             "fidelity": equilibrium.fidelity,
             "degrees of freedom": str(equilibrium.degrees_of_freedom) if equilibrium.success else "",
             "error estimate [m]": f"{equilibrium.error_estimate:.3g}",
@@ -152,6 +169,16 @@ class Report:
             "solve time p95 [ms]": f"{p95:.3f}",
             "solve time max [ms]": f"{max(self._solve_times) * 1e3:.3f}",
         }
+
+
+def _snap_reserve(equilibrium: Equilibrium) -> str:
+    """Nothing where it is not known: under a moment a state can be stable and have no rates."""
+    if not equilibrium.success:
+        return ""
+    try:
+        return f"{equilibrium.snap_reserve:.4g}"
+    except NoEquilibriumError:
+        return ""
 
 
 def _tip(equilibrium: Equilibrium | None) -> str:

@@ -10,8 +10,10 @@ from geometry_msgs.msg import PoseStamped
 from std_msgs.msg import Header
 
 from ctr_pvs import Backbone
+from ctr_pvs import Loads
 from ctr_pvs import Pose
 from ctr_pvs import Status
+from ctr_pvs.errors import FieldError
 from ctr_pvs_interfaces.srv import SolveEquilibrium
 from ctr_pvs_ros import messages
 from ctr_pvs_ros.commands import Command
@@ -20,6 +22,8 @@ from ctr_pvs_ros.commands import RejectedCommand
 from ctr_pvs_ros.parameters import MAX_BACKBONE_POSES
 from ctr_pvs_ros.turns import Late
 from ctr_pvs_ros.turns import Turns
+from ctr_pvs_ros.wrenches import RejectedWrench
+from ctr_pvs_ros.wrenches import check_wrench
 
 if TYPE_CHECKING:
     from ctr_pvs import Equilibrium
@@ -54,16 +58,23 @@ class SolveService:
         poses = request.backbone_poses or default_poses
         try:
             command = self.reader.read(request.joints.name, request.joints.position)
+            force, moment = messages.vectors_of(request.tip_wrench)
+            check_wrench(force, moment)
         except RejectedCommand as rejection:
             return _failed(response, BAD_INPUT, f"{rejection.reason.value}: {rejection}")
+        except RejectedWrench as rejection:
+            return _failed(response, BAD_INPUT, f"{rejection.reason.value}: tip_wrench.{rejection}")
         if not 2 <= poses <= MAX_BACKBONE_POSES:
             rule = f"backbone_poses: expected 0 or 2 to {MAX_BACKBONE_POSES}, got {poses}"
             return _failed(response, BAD_INPUT, rule)
+        loads = Loads(force, moment)
         start = "warm" if request.warm_start else "cold"
         try:
-            solved = self._turns.take(lambda left: self._solve(command, start, poses, left), budget)
+            solved = self._turns.take(lambda left: self._solve(command, loads, start, poses, left), budget)
         except Late as late:
             return _failed(response, Status.TIMEOUT.value, str(late))
+        except FieldError as error:  # a load, at a model level or with a force model that knows none
+            return _failed(response, BAD_INPUT, str(error))
         except Exception as error:  # whatever went wrong, the client gets an answer
             return _failed(response, Status.NOT_CONVERGED.value, f"internal error: {type(error).__name__}: {error}")
         response.success = solved.success
@@ -74,9 +85,9 @@ class SolveService:
             _fill_answer(response, solved.numbers, header)
         return response
 
-    def _solve(self, command: Command, start: str, poses: int, budget: float) -> _Solved:
+    def _solve(self, command: Command, loads: Loads, start: str, poses: int, budget: float) -> _Solved:
         began = time.perf_counter()
-        equilibrium = self._solver.solve(command.alpha, command.D, start=start, budget=budget)
+        equilibrium = self._solver.solve(command.alpha, command.D, start=start, budget=budget, loads=loads)
         took = time.perf_counter() - began
         numbers = _numbers_of(equilibrium, poses) if equilibrium.success else None
         return _Solved(equilibrium.success, equilibrium.status, equilibrium.message, took, numbers)
@@ -88,7 +99,7 @@ class _Numbers:
 
     tip: Pose
     backbone: Backbone
-    arrays: dict[str, list[float]]
+    arrays: dict[str, list[float] | list[bool]]
     scalars: dict[str, float | int | str]
 
 
@@ -105,7 +116,13 @@ class _Solved:
 
 def _numbers_of(equilibrium: Equilibrium, poses: int) -> _Numbers:
     lower, upper = equilibrium.force_interval.T
-    arrays = {"torque": equilibrium.torque, "force": equilibrium.force, "force_lower": lower, "force_upper": upper}
+    arrays = {
+        "torque": equilibrium.torque,
+        "force": equilibrium.force,
+        "force_lower": lower,
+        "force_upper": upper,
+        "force_interval_reversed": equilibrium.force_interval_reversed,
+    }
     return _Numbers(
         equilibrium.tip,
         equilibrium.backbone(poses),

@@ -7,6 +7,10 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
+from ctr_pvs import Loads
 from ctr_pvs import Status
 from ctr_pvs_ros.commands import Command
 from ctr_pvs_ros.commands import Reason
@@ -65,29 +69,35 @@ class Stream:
 
     def __init__(self, solver: EquilibriumSolver) -> None:
         self._solver = solver
-        self._stopped = False
+        self._published: Equilibrium | None = None
+        self.stopped = False  # after a snap under on_snap = stop
         self.last: Command | None = None  # the command behind the last answer that went out
+
+    @property
+    def orientation(self) -> NDArray[np.float64] | None:
+        """Of the tip of the last answer that went out, unit quaternion (4,) xyzw; None: there is none."""
+        return None if self._published is None else self._published.tip.orientation
 
     def release(self) -> None:
         """Accept commands again after a snap under on_snap = stop."""
-        self._stopped = False
+        self.stopped = False
 
-    def follow(self, command: Command, policy: Policy, budget: float) -> Answer:
-        """Solve for a command from the last answer that went out, within `budget` [s].
+    def follow(self, command: Command, policy: Policy, budget: float, loads: Loads | None = None) -> Answer:
+        """Solve for a command under `loads` from the last answer that went out, within `budget` [s].
 
         Raises:
             RejectedCommand: stopped after a snap.
         """
-        if self._stopped:
+        if self.stopped:
             raise RejectedCommand(Reason.STOPPED, "stopped after a snap; set on_snap to go on")
         # A withheld answer must not become the place the next command starts from, so the solve runs on a copy.
         solver = copy.copy(self._solver)
         began = time.perf_counter()
-        equilibrium = solver.solve(command.alpha, command.D, start="warm", budget=budget)
+        equilibrium = solver.solve(command.alpha, command.D, start="warm", budget=budget, loads=loads)
         solve_time = time.perf_counter() - began
         verdict = judge(equilibrium, policy)
         if verdict.publish:
-            self._solver, self.last = solver, command
+            self._solver, self.last, self._published = solver, command, equilibrium
         elif equilibrium.status is Status.SNAP and policy.on_snap == "stop":
-            self._stopped = True
+            self.stopped = True
         return Answer(equilibrium, verdict, solve_time)

@@ -94,7 +94,7 @@ build_workspace() {
 # The solver also runs without: no reason to fail.
 compile_kernels() {
   local outcome
-  say "compiling the kernels, once for these sources (two minutes or so)"
+  say "compiling the kernels, once for these sources (a few minutes)"
   if outcome=$(python3 -m ctr_pvs.kernel); then
     say "$outcome"
     { echo "$1"; python3 -m ctr_pvs.kernel --where; } >"$WORKSPACE/kernels_made_from"
