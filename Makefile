@@ -28,12 +28,14 @@ test: lint ## lint, solver tests and node tests
 soak: setup ## the long tests; SOAK_MINUTES=1 shortens the longest of them, 10 minutes of load
 	@$(IN_ENV) python3 -m pytest -m soak
 
-bench: setup ## speed against accuracy, measured here and charted: docs/speed_accuracy.*, docs/cost_growth.*
+bench: setup ## speed against accuracy, measured here and charted: docs/speed_accuracy.*, docs/cost_growth.*, docs/loaded_cost.*
 	@$(IN_ENV) python3 -m bench.speed.speed_accuracy
 	@$(IN_ENV) python3 -m bench.growth.cost_growth
 	@$(IN_ENV) python3 -m bench.serving.serving_cost
 	@$(IN_ENV) python3 -m bench.serving.hard_cases
 	@$(IN_ENV) python3 -m bench.accuracy.effectivity
+	@$(IN_ENV) python3 -m bench.accuracy.loaded_effectivity
+	@$(IN_ENV) python3 -m bench.loads.loaded_cost
 	@$(IN_ENV) python3 -m bench.node.node_latency
 
 clean: ## remove everything that make has made, compiled kernels in the user's cache among it

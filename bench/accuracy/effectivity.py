@@ -29,11 +29,13 @@ from bench.common.random_robots import random_robot
 from ctr_pvs import Equilibrium
 from ctr_pvs import EquilibriumSolver
 from ctr_pvs import Robot
+from ctr_pvs.answer.degrees import settled
 from ctr_pvs.answer.engine import Engine
 from ctr_pvs.answer.state import State
 from ctr_pvs.kernel.walk.step import OK
 from ctr_pvs.solve.dense import DenseEnergy
 from ctr_pvs.solve.equilibria import stationary
+from ctr_pvs.solve.path import NO_LOADS
 
 Array = NDArray[np.float64]
 
@@ -91,8 +93,8 @@ def true_tips(robot: Robot, answer: Equilibrium) -> tuple[Array, Array]:
     found, _ = stationary(energy, answer.alpha, near, ROOM)
     if found is None:
         return NOWHERE, NOWHERE
-    code, settled = engine.settle(energy.state(near, answer.alpha).vector, False)
-    tip = State(settled, len(answer.D)).tip[:3] if code == OK else NOWHERE
+    code, vector = settled(engine, energy.state(near, answer.alpha).vector, NO_LOADS, False)
+    tip = State(vector, len(answer.D)).tip[:3] if code == OK else NOWHERE
     return energy.state(found, answer.alpha).tip[:3], tip
 
 

@@ -16,7 +16,7 @@ from ctr_pvs.kernel.arrays import S_FLOOR
 from ctr_pvs.kernel.arrays import S_TWISTS
 from ctr_pvs.kernel.arrays import S_UNKNOWNS
 from ctr_pvs.kernel.arrays import STATE
-from ctr_pvs.kernel.layout import FINER
+from ctr_pvs.kernel.sections import FINER
 from ctr_pvs.model.packing import HIGHEST_DEGREE
 from ctr_pvs.model.shape import Shape
 from ctr_pvs.solve.dense import DenseEnergy

@@ -6,4 +6,5 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS, CONFIG = ROOT / "docs", ROOT / "config"
-SPEED, STABILITY = DOCS / "speed_accuracy.md", DOCS / "stability.md"
+SPEED, STABILITY, LOADS = DOCS / "speed_accuracy.md", DOCS / "stability.md", DOCS / "loads.md"
+FIGURES = DOCS / "figures"

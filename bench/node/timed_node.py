@@ -37,8 +37,10 @@ from ctr_pvs import EquilibriumSolver
 from ctr_pvs import load_robot
 from ctr_pvs_ros import messages
 from ctr_pvs_ros import node as production
+from ctr_pvs_ros.inputs import NEWEST_WINS
 from ctr_pvs_ros.outputs import Output
 from ctr_pvs_ros.outputs import Sent
+from ctr_pvs_ros.publishers import LATE_JOINERS_SEE_THE_LAST
 from ctr_pvs_ros.stream import Stream
 
 ROBOT = CONFIG / "renda2021.yaml"
@@ -77,7 +79,7 @@ def timed_node(times: Times) -> Node:
     """The production node; only this process's copies of its functions are wrapped."""
     kind = production.EquilibriumNode
     for owner, name, part in (
-        (kind, "_on_command", "in all"),
+        (kind, "_answer", "in all"),
         (Stream, "follow", "solve"),
         (Output, "publish", "publish"),
     ):
@@ -126,7 +128,7 @@ def echo_node(times: Times) -> Node:
     ]
     ready = []
     for kind, topic, message in outputs:
-        publisher = node.create_publisher(kind, topic, production.LATE_JOINERS_SEE_THE_LAST)
+        publisher = node.create_publisher(kind, topic, LATE_JOINERS_SEE_THE_LAST)
         ready.append((publisher, serialize_message(message), kind is not Float64))
 
     def answer(command: bytes) -> None:
@@ -135,7 +137,7 @@ def echo_node(times: Times) -> Node:
             publisher.publish(message[:4] + stamp + message[12:] if stamped else message)
 
     callback = timed(answer, times["in all"])
-    node.create_subscription(JointState, "servo_jp", callback, production.NEWEST_WINS, raw=True)
+    node.create_subscription(JointState, "servo_jp", callback, NEWEST_WINS, raw=True)
     return node
 
 

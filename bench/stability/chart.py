@@ -13,32 +13,13 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from bench.stability.judges import Outcome
+from bench.stability.marks import COLOURS
+from bench.stability.marks import PALE
+from bench.stability.marks import SIGNS
 from bench.stability.methods import METHODS
 from bench.stability.rows import Row
 from ctr_pvs.oracles.two_tubes import critical_lambda
 
-#: Good to bad; told apart by lightness too, and by a sign in each cell.  After Okabe and Ito.
-COLOURS = {
-    Outcome.RIGHT: "#e6eef5",
-    Outcome.SNAP: "#9ccbea",
-    Outcome.FAILURE: "#f7e08a",
-    Outcome.RESUMED: "#e8a82e",
-    Outcome.FALSE_ALARM: "#8fbf9f",
-    Outcome.WRONG: "#d55e00",
-    Outcome.UNSTABLE: "#8e2f74",
-    Outcome.NOTHING: "#1a1a1a",
-}
-SIGNS = {
-    Outcome.RIGHT: "",
-    Outcome.SNAP: "S",
-    Outcome.FAILURE: "F",
-    Outcome.RESUMED: "R",
-    Outcome.FALSE_ALARM: "A",
-    Outcome.WRONG: "W",
-    Outcome.UNSTABLE: "U",
-    Outcome.NOTHING: "N",
-}
-PALE = (Outcome.WRONG, Outcome.UNSTABLE, Outcome.NOTHING)
 WARM, COLD = "warm", ("cold before the fold", "cold past the fold")
 
 

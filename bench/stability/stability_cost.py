@@ -29,6 +29,7 @@ from ctr_pvs.answer.engine import Engine
 from ctr_pvs.answer.equilibrium import RELAXED_DEGREE
 from ctr_pvs.solve.equilibria import stationary
 from ctr_pvs.solve.path import DEGREES
+from ctr_pvs.solve.path import NO_LOADS
 from ctr_pvs.solve.path import CommandPath
 from ctr_pvs.solve.path import follow
 from ctr_pvs.solve.snap import land
@@ -74,7 +75,9 @@ def tasks(alpha: Array) -> dict[str, Task]:
         "warm answer, 0.1° further": answers(alpha, False),
         "warm answer, 0.1 mm further": answers(alpha, True),
         "plain Newton in numpy, 0.1° further": lambda: stationary(energy, alpha + STEP, y, np.inf),
-        "of the warm answer the proven step": lambda: engine.advance(state.vector, alpha + STEP, D, True),
+        "of the warm answer the proven step": lambda: engine.step(
+            state.vector, alpha + STEP, D, NO_LOADS, untwisted=True
+        ),
         "following the path, 0.1° further": lambda: follow(engine, rotation, state, degree, np.inf),
         "following the path, 0.1 mm further": lambda: follow(engine, slide, state, degree, np.inf),
         "margin": lambda: engine.margin(state.vector),
@@ -92,7 +95,7 @@ def landing() -> tuple[Task, Task]:
     lost = follow(engine, path, state, degree, np.inf)
     return (
         lambda: follow(engine, path, state, degree, np.inf),
-        lambda: land(engine, path.at, lost.state, lost.t, degree, np.inf),
+        lambda: land(engine, path.command, lost.state, lost.t, degree, np.inf),
     )
 
 

@@ -1,0 +1,1 @@
+"""Where methods fail under external loads, sweeps, and an independent tracker that judges them."""

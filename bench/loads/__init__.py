@@ -1,0 +1,1 @@
+"""Robots under external loads: what they cost, and the figures of docs/loads.md."""
