@@ -23,7 +23,17 @@ from ctr_pvs.solve.equilibria import stationary
 
 FULLEST = 12  # modules in a folder
 #: The only modules that draw.
-CHARTS = {"bench.speed.chart", "bench.growth.chart", "bench.stability.chart", "bench.pvs.insertion_figures"}
+CHARTS = {
+    "bench.growth.chart",
+    "bench.loads.compliance_sweep",
+    "bench.loads.cost_chart",
+    "bench.loaded.failure_chart",
+    "bench.loads.snap_map",
+    "bench.loads.turning_force",
+    "bench.pvs.insertion_figures",
+    "bench.speed.chart",
+    "bench.stability.chart",
+}
 
 
 def modules() -> dict[str, Path]:

@@ -28,7 +28,7 @@ def newton_step_of_kernel(engine, state, turned, finer):
     finds the Hessian not positive definite."""
     kit = arrays.Kit(*engine.fixed())
     scene, bench = arrays.scene_of(kit, open_state(kit, state.vector, engine.tolerance)), arrays.bench_of(kit)
-    good = newton_step(scene, bench, kit.rules, state.alpha, turned, finer, EXACT, 0.0)
+    good = newton_step(scene, bench, kit.tubes, kit.rules, state.alpha, turned, finer, EXACT, 0.0)
     return scene.vectors[arrays.STEP, : len(state.unknowns)].copy() if good else None
 
 
@@ -66,7 +66,7 @@ def test_rates_of_the_tubes_ends_are_those_of_the_whole_matrix(scene):
     """d psi_end / d alpha = 1 - A H^-1 d2E/dy dalpha, in states that are no equilibria too."""
     energy, alpha, y = scene_of(scene)
     engine, state = energy.engine, energy.state(y, alpha)
-    code, _, gain = engine.rates(state.vector)
+    code, _, gain, _ = engine.rates(state.vector)
     if energy.eigenvalues(y, alpha).min(initial=1.0) <= 0.0:
         assert code == NOT_PROVEN
         return

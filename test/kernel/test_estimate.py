@@ -8,7 +8,7 @@ from random_robots import random_D
 from random_robots import random_robot
 
 from ctr_pvs import EquilibriumSolver
-from ctr_pvs.kernel.layout import INTEGRATION_SHARE
+from ctr_pvs.kernel.sections import INTEGRATION_SHARE
 
 EXACT = 1e-10
 ROUNDING = 1e-12  # m

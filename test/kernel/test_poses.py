@@ -19,7 +19,7 @@ from ctr_pvs import Robot
 from ctr_pvs import Segment
 from ctr_pvs import Tube
 from ctr_pvs.kernel.backbone.frames import arc
-from ctr_pvs.kernel.layout import nodes_for_turn
+from ctr_pvs.kernel.sections import nodes_for_turn
 from ctr_pvs.model.packing import MOST_NODES
 from ctr_pvs.model.packing import PLACE
 from ctr_pvs.model.packing import WEIGHT

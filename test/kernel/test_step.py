@@ -16,10 +16,12 @@ from ctr_pvs import Robot
 from ctr_pvs import Segment
 from ctr_pvs import Status
 from ctr_pvs import Tube
+from ctr_pvs.answer.degrees import settled
 from ctr_pvs.answer.state import State
 from ctr_pvs.kernel.walk.step import OK
 from ctr_pvs.solve.dense import DenseEnergy
 from ctr_pvs.solve.equilibria import stationary
+from ctr_pvs.solve.path import NO_LOADS
 
 PARTIAL = np.array([0.0935, 0.1705])
 
@@ -62,7 +64,7 @@ def test_a_state_put_down_at_other_degrees_is_the_same_equilibrium(seed):
     )[0]
     y, _ = stationary(energy, alpha, start, 0.1)
     fine = energy.state(y, alpha)
-    code, vector = engine.settle(fine.vector, False)
+    code, vector = settled(engine, fine.vector, NO_LOADS, False)
     assert code == OK
     s = np.linspace(0.0, answer.length, 40)
     assert engine.angles(vector, s)[0] == pytest.approx(engine.angles(answer.state.vector, s)[0], abs=1e-10)

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from ctr_pvs import Loads
+from ctr_pvs import Pose
 from ctr_pvs import Status
 from ctr_pvs_ros.commands import Command
 from ctr_pvs_ros.commands import Reason
@@ -21,6 +23,7 @@ class Outcome:
     status: Status = Status.OK
     stability_margin: float = 1.0
     message: str = "what the solver says"
+    tip: Pose | None = None
 
     @property
     def success(self) -> bool:
@@ -34,10 +37,12 @@ class ScriptedSolver:
         self.script = script
         self.started_from: list[Outcome | None] = []
         self.kept: Outcome | None = None
+        self.loads: list[Loads | None] = []
 
-    def solve(self, alpha, D, start, budget) -> Outcome:
+    def solve(self, alpha, D, start, budget, loads) -> Outcome:
         assert start == "warm"
         assert budget == 0.5
+        self.loads.append(loads)
         outcome = self.script.pop(0)
         self.started_from.append(self.kept)
         if outcome.success:
@@ -109,3 +114,16 @@ def test_after_a_snap_under_stop_commands_are_refused_until_released():
         assert caught.value.reason is Reason.STOPPED
     stream.release()
     assert stream.follow(COMMAND, policy("stop"), 0.5).verdict.publish
+
+
+def test_a_load_is_solved_for_and_turned_by_the_last_tip_that_went_out():
+    """A wrench in the tip's frame must not be turned by a tip that nobody has seen."""
+    first, withheld = (Pose(np.zeros(3), np.array([0.0, 0.0, np.sin(x), np.cos(x)])) for x in (0.1, 0.2))
+    solver = ScriptedSolver([Outcome(tip=first), Outcome(Status.SNAP, tip=withheld), Outcome(Status.TIMEOUT)])
+    stream, load = Stream(solver), Loads(tip_force=(0.0, 0.1, 0.0))
+    loads = [None, load, Loads()]
+    assert stream.orientation is None
+    for each in loads:
+        stream.follow(COMMAND, policy("hold"), 0.5, each)
+        assert stream.orientation is first.orientation
+    assert solver.loads == loads

@@ -11,11 +11,17 @@ from typing import Any
 import rclpy
 from geometry_msgs.msg import PoseArray
 from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import Vector3
+from geometry_msgs.msg import Wrench
+from geometry_msgs.msg import WrenchStamped
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
+
+from ctr_pvs.robot.loads import ZERO
+from ctr_pvs.robot.loads import Vector
 
 # What must never stand in the log of a node that is only misused. rcl and Fast DDS write errors of their own kind.
 FAULTS = ("Traceback", "Exception", "Error:", "RCLError", "bad_alloc", "terminate called")
@@ -32,6 +38,20 @@ def joint_state(names: list[str], positions: list[float], stamp: int = 0) -> Joi
     message = JointState(name=names, position=positions)
     message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 1_000_000_000)
     return message
+
+
+def wrench_message(force: Vector, moment: Vector = ZERO, frame: str = "ctr_base", stamp: int = 0) -> WrenchStamped:
+    """A wrench with a stamp in ns."""
+    message = WrenchStamped(wrench=wrench(force, moment))
+    message.header.frame_id = frame
+    message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 1_000_000_000)
+    return message
+
+
+def wrench(force: Vector, moment: Vector) -> Wrench:
+    """A force [N] and a moment [N m]."""
+    vectors = (Vector3(**dict(zip("xyz", vector, strict=True))) for vector in (force, moment))
+    return Wrench(**dict(zip(("force", "torque"), vectors, strict=True)))
 
 
 def stamp_of(message: Any) -> int:

@@ -21,7 +21,7 @@ LIMIT = 2.0  # s, to end after a signal
 COMPILING = 1200.0  # s; a busy machine takes its time
 IMPORTS = """
 import sys
-from ctr_pvs_ros.node import main
+from ctr_pvs_ros.executable import main
 print(main(["node", "--ros-args", "-p", f"robot_file:={sys.argv[1]}"]), "numba" in sys.modules)
 """
 

@@ -12,6 +12,7 @@ from ctr_pvs import Status
 from ctr_pvs_ros.commands import Reason
 from ctr_pvs_ros.parameters import PARAMETERS
 from ctr_pvs_ros.service import BAD_INPUT
+from ctr_pvs_ros.wrenches import WrenchReason
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "ros_interface.md"
 JOINTS = ["outer_rotation", "outer_translation", "inner_rotation", "inner_translation"]
@@ -22,7 +23,7 @@ PARAMETER_SERVICE = re.compile(r"/(describe|get|list|set)_parameter|/get_type_de
 
 @pytest.fixture(scope="module")
 def peer(start_node):
-    peer = start_node("/documented", publish_backbone_s="true")
+    peer = start_node("/documented", publish_backbone_s="true", use_external_wrench="true")
     peer.wait(
         lambda: ("ctr_equilibrium", "/documented") in peer.ros.get_node_names_and_namespaces(), "name of the node"
     )
@@ -106,6 +107,7 @@ def test_status_codes_and_reasons():
     told = {code(row[0])[0]: row[1] == "yes" for row in table("status")}
     assert told == {**{status.value: status.success for status in Status}, BAD_INPUT: False}
     assert [code(row[0])[0] for row in table("reason")] == [reason.value for reason in Reason]
+    assert [code(row[0])[0] for row in table("refusal")] == [reason.value for reason in WrenchReason]
 
 
 def test_fields_of_the_service():

@@ -69,7 +69,8 @@ def test_the_method_of_the_solver(seed_robot):
 
 
 def cold_rows(engine: Engine, alpha: np.ndarray, D: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The states that the kernel finds for many commands, without their unknowns, and what it says of each."""
+    """The states that the kernel finds for many commands, without their unknowns, and what it says
+    of each."""
     out, codes = np.zeros((len(alpha), STATE + 3 * alpha.shape[1])), np.full(len(alpha), -1)
     engine.cold_rows(alpha, D, True, out, codes)
     return out, codes
@@ -299,7 +300,7 @@ def test_memory_is_bounded(seed_robot):
 
 @pytest.mark.parametrize("tubes", [1, 2, 3, 4])
 @pytest.mark.parametrize("seed", range(6))
-def test_rows_of_the_kernel_are_its_cold_starts(seed, tubes):
+def test_rows_of_the_kernel_are_its_single_answers(seed, tubes):
     """Bit by bit, and a workspace that is too small for some of the rows leaves nothing out."""
     rng = np.random.default_rng([seed, tubes, 87])
     robot = random_robot(rng, tubes)
@@ -314,5 +315,5 @@ def test_rows_of_the_kernel_are_its_cold_starts(seed, tubes):
     for row, code in enumerate(codes.tolist()):
         again, state = Engine(robot, 1e-6).cold_start(alpha[row], D[row], True)
         assert again == code
-        if code in (OK, MORE):
+        if code == OK:
             assert np.array_equal(state[: numbers.shape[1]], numbers[row])

@@ -18,6 +18,7 @@ from ctr_pvs import Tube
 from ctr_pvs.answer.engine import Engine
 from ctr_pvs.answer.state import Snap
 from ctr_pvs.answer.state import State
+from ctr_pvs.kernel.arrays import STATE
 from ctr_pvs.oracles.two_tubes import TwoTubes
 from ctr_pvs.solve.dense import DenseEnergy
 from ctr_pvs.solve.path import joined
@@ -390,7 +391,8 @@ def test_the_states_of_a_snap_tell_their_own_numbers(seed_robot):
 
 def snap_at(alpha, released):
     turned = np.array([0.0, alpha])
-    return Snap(alpha, turned, np.zeros(2), "before", "after", released)
+    unloaded = State(np.zeros(STATE + 6), 2)
+    return Snap(alpha, turned, np.zeros(2), unloaded, unloaded, released)
 
 
 def test_what_only_begins_a_snap_is_part_of_it():
