@@ -70,7 +70,7 @@ def test_virtual_work_against_differences(name):
         assert np.abs(tangent - tangent.T).max() > 1e-4
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+@pytest.mark.parametrize("case", some(CASES, {0, 9, 13, 16}), ids=lambda case: case.name)
 def test_converged_cases(case: Case):
     """As a cold start goes: turned unloaded, then loaded; the margin is in the reference's own metric."""
     judge = LoadedJudge(case.robot)

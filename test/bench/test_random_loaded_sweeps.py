@@ -101,6 +101,7 @@ def test_another_branch(start):
     assert verdict.found == "WRONG BRANCH" and "judge ended at 1.0000, apart" in verdict.remark
 
 
+@pytest.mark.soak
 def test_a_snap_that_is_told_and_one_that_is_not(start, loaded_start, monkeypatch):
     """With 1 N to the side the branch ends at 297.19 deg; the robot falls to the branch of -60 deg."""
     monkeypatch.setattr(random_loaded_sweeps, "told", lambda answer, state: state)

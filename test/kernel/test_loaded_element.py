@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from long_runs import some
 from random_loads import random_loads
 from random_robots import random_D
 from random_robots import random_robot
@@ -158,7 +159,7 @@ def test_the_gradient_of_forces_is_that_of_the_energy(key):
 
 @pytest.mark.parametrize("which", [COARSE, FINE])
 @pytest.mark.parametrize("moments", [False, True])
-@pytest.mark.parametrize("key", SCENES, ids=str)
+@pytest.mark.parametrize("key", some(SCENES, {0, 3, 6, 9, 11}), ids=str)
 def test_what_is_factorised_is_the_slope_of_the_gradient(key, moments, which):
     """J^-1 (J d + the change with turning bases) gives d back: with moments, J is unsymmetric."""
     loaded, rng = scene(key, moments), np.random.default_rng(6)
@@ -172,7 +173,7 @@ def test_what_is_factorised_is_the_slope_of_the_gradient(key, moments, which):
         assert not found[~counts].any()
 
 
-@pytest.mark.parametrize("key", [(0, 2), (1, 3), "one base on the orifice"], ids=str)
+@pytest.mark.parametrize("key", some([(0, 2), (1, 3), "one base on the orifice"], {0}), ids=str)
 def test_transposed_tangents(key):
     loaded, rng = scene(key, True, 5), np.random.default_rng(7)
     matrix = loaded.matrix()
@@ -190,7 +191,7 @@ def test_transposed_tangents(key):
 
 
 @pytest.mark.parametrize("moments", [False, True])
-@pytest.mark.parametrize("key", [(0, 1), (0, 2), (1, 2), (2, 3), "tips in reverse order"], ids=str)
+@pytest.mark.parametrize("key", some([(0, 1), (0, 2), (1, 2), (2, 3), "tips in reverse order"], {0, 1}), ids=str)
 def test_pivots_and_margin_are_those_of_the_whole_matrix(key, moments):
     """The smaller one of bending alone, psi held, and of psi, bending eliminated, relative to their own stiffness."""
     loaded = scene(key, moments, 3)

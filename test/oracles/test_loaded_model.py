@@ -45,7 +45,7 @@ def rod(loads: Loads, **options):
     return solve_loaded(ROD, [0.0], [GUIDE], loads, **options)
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+@pytest.mark.parametrize("case", some(CASES, {0, 9, 13, 16, 17}), ids=lambda case: case.name)
 def test_converged_cases(case: Case):
     """Along the way of a cold start: pose, angles, torques, forces at and behind the orifice."""
     solution, values = along_path(case.robot, case.alpha, case.D, case.loads, case.relaxed), case.values
