@@ -88,6 +88,7 @@ class Galerkin:
                 rows += [m] * panels
                 ends += [a + (b - a) * (i + 1) / panels for i in range(panels)]
         self.section, self.edges = np.array(rows, dtype=int), np.array(ends)
+        self.loaded_ends = np.isin(self.edges[1:], points).astype(int)
         self.start, self.h = self.edges[:-1], np.diff(self.edges)
         self.P, self.Q, self.G = len(rows), self.degree + 1, len(self.rule.x)
         self.s = self.start[:, None] + self.h[:, None] * self.rule.x
@@ -148,8 +149,10 @@ class Galerkin:
 
     @cached_property
     def signature(self) -> tuple[int, bytes]:
-        """Equal where coefficients of one D can be taken for those of another."""
-        return self.degree, np.append(self.domain.segment[self.section].ravel(), self.section).tobytes()
+        """Equal where coefficients of one D can be taken for those of another: pieces of the same segments, with a
+        point load at the end of the same ones."""
+        kinds = [self.domain.segment[self.section], self.section[:, None], self.loaded_ends[:, None]]
+        return self.degree, np.hstack(kinds).tobytes()
 
     # --- fields -------------------------------------------------------------------------------------------------------
 

@@ -15,6 +15,7 @@ from long_runs import some
 from random_robots import random_D
 from random_robots import random_robot
 
+from bench.loaded.loaded_galerkin import LONGEST
 from bench.loaded.loaded_galerkin import Galerkin
 from bench.loaded.loaded_judge import LoadedJudge
 from bench.loaded.loaded_judge import LoadedPath
@@ -165,6 +166,20 @@ def test_coefficients_move_to_another_domain():
     assert model.P > place.model.P
     assert model.tip(fields) == pytest.approx(place.tip, abs=1e-10)
     assert model.psi_ends(moved, case.alpha) == pytest.approx(place.psi_ends, abs=1e-9)
+
+
+def test_a_seam_is_no_point_load():
+    """A load that divides a section into as many pieces as its seam did, elsewhere, makes other pieces of it."""
+    case = next(case for case in CASES if case.name == "seed_full_60_pull")
+    place = turned_place(case)
+    edges = place.model.domain.boundaries
+    m = next(m for m, length in enumerate(np.diff(edges)) if LONGEST < length < 1.5 * LONGEST)
+    inner = case.robot.n_tubes - 1
+    at = float(edges[m] + np.diff(edges)[m] / 3.0 + case.D[inner])
+    model = Galerkin(case.robot, case.D, Loads(point_forces=(PointForce(inner, at, (0.0, 1e-3, 0.0)),)), 6)
+    assert model.P == place.model.P and model.signature != place.model.signature
+    moved = resampled(place, model)
+    assert model.tip(model.fields(moved, case.alpha)) == pytest.approx(place.tip, abs=1e-8)
 
 
 def test_paths_mix_their_loads():
