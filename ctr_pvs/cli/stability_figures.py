@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ctr_pvs.cli.stability_scan import Scan
 from ctr_pvs.cli.stability_scan import SweepSnap
 from ctr_pvs.renda2021.figures import empty_figure
+from ctr_pvs.renda2021.figures import make_folder
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,7 +31,7 @@ def save_pictures(scan: Scan, folder: Path) -> list[Path]:
 
     Raises ``PictureError`` where matplotlib is missing, ``OSError`` where the folder cannot be written.
     """
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     paths = [folder / "stability.png"]
     _save_sweep(scan, paths[0])
     if scan.map is not None:

@@ -115,10 +115,16 @@ def _set_box(axes: Any, low: Array, high: Array) -> None:
     axes.set_box_aspect(high - low, zoom=1.1)
 
 
+def make_folder(folder: Path) -> None:
+    """The folder for pictures, made if missing; raises ``PictureError`` where none can be drawn, and makes none."""
+    empty_figure((1.0, 1.0))
+    folder.mkdir(parents=True, exist_ok=True)
+
+
 def empty_figure(size: tuple[float, float]) -> Figure:
     """An empty figure of ``size`` [in] that needs no display."""
     try:
         from matplotlib.figure import Figure
     except ImportError as error:
-        raise PictureError("pictures need matplotlib, which is not installed (pip install matplotlib)") from error
+        raise PictureError("pictures need matplotlib (pip install 'ctr_pvs[plot]')") from error
     return Figure(figsize=size, dpi=DPI)

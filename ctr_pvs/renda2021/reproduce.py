@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ctr_pvs.renda2021.columns import aligned
+from ctr_pvs.renda2021.figures import make_folder
 from ctr_pvs.renda2021.figures import save_fig2
 from ctr_pvs.renda2021.figures import save_fig4
 from ctr_pvs.renda2021.loads import table2
@@ -79,7 +80,7 @@ def save_pictures(reproduction: Reproduction, folder: Path) -> list[Path]:
 
     Raises ``PictureError`` where matplotlib is missing, ``OSError`` where the folder cannot be written.
     """
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     paths = [folder / "fig2.png", folder / "fig4.png"]
     save_fig2(reproduction.branches, paths[0])
     save_fig4(reproduction.sweeps, paths[1])
