@@ -17,7 +17,6 @@ setup(
     python_requires=">=3.11",
     packages=find_packages(include=["ctr_pvs", "ctr_pvs.*", "ctr_pvs_ros", "ctr_pvs_ros.*"]),
     data_files=[
-        ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (f"share/{PACKAGE}", ["package.xml"]),
         (f"share/{PACKAGE}/launch", sorted(glob("launch/*.xml"))),
         (f"share/{PACKAGE}/config", sorted(glob("config/*.yaml"))),
@@ -27,11 +26,4 @@ setup(
     install_requires=["numpy>=1.26", "scipy>=1.11", "pyyaml>=6", "numba>=0.59"],
     extras_require={"test": ["pytest"], "demo": ["matplotlib"]},
     zip_safe=True,
-    entry_points={
-        "console_scripts": [
-            "ctr-pvs = ctr_pvs.cli.main:main",
-            "equilibrium_node = ctr_pvs_ros.executable:main",
-            "sweep_demo = ctr_pvs_ros.demo:main",
-        ],
-    },
 )

@@ -114,8 +114,8 @@ if [ "$(cat "$VENV/made_from" 2>/dev/null)" != "$venv_key" ]; then
 fi
 
 # Python modules are left out on purpose: they run from the working tree (see enter_workspace).
-workspace_key=$(find ctr_pvs_interfaces config launch resource test/data package.xml setup.py setup.cfg \
-  colcon_defaults.yaml -type f -print0 | sort -z | xargs -0 sha256sum | cat - "$VENV/made_from" | sha256sum)
+workspace_key=$(find ctr_pvs_interfaces config launch test/data package.xml setup.cfg CMakeLists.txt \
+  scripts/executable.py.in -type f -print0 | sort -z | xargs -0 sha256sum | cat - "$VENV/made_from" | sha256sum)
 if [ "$(cat "$WORKSPACE/made_from" 2>/dev/null)" != "$workspace_key" ]; then
   enter_venv "$ROS"
   build_workspace
