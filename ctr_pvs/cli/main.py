@@ -25,6 +25,7 @@ from ctr_pvs.cli.loads import loads_in
 from ctr_pvs.cli.report import answer_as_json
 from ctr_pvs.cli.report import answer_as_text
 from ctr_pvs.cli.stability import declare_stability
+from ctr_pvs.cli.version import declare_version
 from ctr_pvs.cli.words import UsageError
 from ctr_pvs.cli.words import is_number
 from ctr_pvs.cli.words import number
@@ -82,7 +83,7 @@ def _declare_solve(subcommands: argparse._SubParsersAction[_Parser]) -> None:
         description="Solves for the equilibrium of a robot. Give one rotation and one translation per tube, outermost "
         "first. The model has no friction and no clearance, and is quasi-static.",
     )
-    solve.add_argument("robot", metavar="ROBOT", help="robot file (YAML)")
+    solve.add_argument("robot", metavar="ROBOT", help="robot file (YAML), or the name of a shipped robot")
     solve.add_argument(
         "--alpha", nargs="+", type=number, required=True, metavar="A", help="base rotation of each tube [rad]"
     )
@@ -209,6 +210,7 @@ def _parser() -> _Parser:
         description="Equilibria of concentric tube robots.",
         epilog=EXIT_CODES,
     )
+    declare_version(parser)
     subcommands = parser.add_subparsers(metavar="SUBCOMMAND", required=True)
     for declare in (_declare_solve, _declare_reproduce, declare_stability):
         declare(subcommands)

@@ -34,7 +34,7 @@ def declare_stability(subcommands: argparse._SubParsersAction[Any]) -> None:
         "snaps, and all folds where exactly two pre-curved tubes overlap. The margin is 1 where nothing pulls the "
         "tubes off, 0 where the branch ends, negative for unstable equilibria.",
     )
-    stability.add_argument("robot", metavar="ROBOT", help="robot file (YAML)")
+    stability.add_argument("robot", metavar="ROBOT", help="robot file (YAML), or the name of a shipped robot")
     stability.add_argument(
         "--D", nargs="+", type=number, required=True, metavar="D", help="base-to-orifice distance of each tube [m]"
     )

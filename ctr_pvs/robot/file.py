@@ -23,6 +23,8 @@ from ctr_pvs.robot.robot import Robot
 from ctr_pvs.robot.robot import Segment
 from ctr_pvs.robot.robot import Tube
 from ctr_pvs.robot.robot import check_diameters
+from ctr_pvs.robot.shipped import is_a_name
+from ctr_pvs.robot.shipped import shipped_robots
 from ctr_pvs.robot.strict_yaml import read_yaml
 
 _MODULI = ("youngs_modulus", "shear_modulus", "poissons_ratio")
@@ -42,7 +44,7 @@ _LARGEST_COEFFICIENT = 1e100
 
 
 def load_robot(path: str | os.PathLike[str]) -> Robot:
-    """The robot that a YAML file describes.
+    """The robot that a YAML file describes: a path, or the name of a robot that comes with the code (`renda2021`).
 
     ::
 
@@ -69,8 +71,8 @@ def load_robot(path: str | os.PathLike[str]) -> Robot:
     Raises:
         RobotFileError: for anything that cannot be read or breaks a rule, naming file, key path, value and rule.
     """
-    file = os.fspath(path)
-    content = read_yaml(path)
+    file = _file(os.fspath(path))
+    content = read_yaml(file)
     if not isinstance(content, dict):
         raise RobotFileError(file, "", content, "a mapping with the keys name and tubes")
     top = Table(file, "", content)
@@ -80,6 +82,17 @@ def load_robot(path: str | os.PathLike[str]) -> Robot:
     with top.blamed():
         robot = Robot(name, tubes)  # so that limits are read against names known to be good
         return replace(robot, limits=_limits(top.table("limits"), [tube.name for tube in tubes]))
+
+
+def _file(path: str) -> str:
+    """The path of the file that is meant."""
+    if not is_a_name(path):
+        return path
+    shipped = shipped_robots()
+    if path not in shipped:
+        names = ", ".join(shipped) or "none: the folder share/ctr_pvs was not installed"
+        raise RobotFileError(path, "", "no such file", f"a robot file, or the name of a shipped robot ({names})")
+    return os.fspath(shipped[path])
 
 
 def _tube(table: Table) -> Tube:
