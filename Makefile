@@ -12,7 +12,7 @@ setup: ## ROS 2 (sourced, or a venv), the built workspace and the compiled kerne
 	@scripts/setup.sh
 
 demo: setup ## stream the two sweeps of Fig. 4 through the node, check every tip, draw demo/fig4.png
-	@$(IN_ENV) python3 -m ctr_pvs_ros.demo --output demo
+	@$(IN_ENV) sweep_demo --output demo
 
 run: setup ## serve equilibria until Ctrl-C; another robot: make run ROBOT=path.yaml
 	@$(IN_ENV) equilibrium_node --ros-args --params-file config/equilibrium_node.yaml -p robot_file:=$(ROBOT)

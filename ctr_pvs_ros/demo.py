@@ -6,7 +6,6 @@ every tip is within TIP_TOLERANCE of the reference values.
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
 import sys
@@ -164,8 +163,8 @@ def curves(results: list[Result]) -> list[Curves]:
     return panels
 
 
-def run(output: Path) -> bool:
-    """Stream, tell and draw; whether every tip is near enough. Raises NoReply."""
+def run(picture: Path) -> bool:
+    """Stream, tell and draw; whether every tip is near enough. Raises NoReply, or OSError for the picture."""
     rows = read_rows()
     print("starting the node and streaming two sweeps over DDS", flush=True)
     with NodeProcess(share_file("config", "renda2021.yaml")):
@@ -173,7 +172,6 @@ def run(output: Path) -> bool:
         client.wait_for_node(START_TIMEOUT)
         results = stream_with_progress(client, rows)
         service = call_service(client, next(row for row in rows if row.angle == 100))
-    picture = output / "fig4.png"
     save_picture(curves(results), picture)
     worst = max(result.error for result in results)
     print(table(results), service, "", sep="\n")
@@ -182,23 +180,16 @@ def run(output: Path) -> bool:
     return worst <= TIP_TOLERANCE
 
 
-def main() -> int:
-    """Entry point of the executable sweep_demo; returns its exit code."""
-    parser = argparse.ArgumentParser(description="Stream the sweeps of Fig. 4 through the node and check every tip.")
-    parser.add_argument("--output", type=Path, default=Path("demo"), help="folder for the picture")
-    arguments = parser.parse_args()
+def main(picture: Path) -> int:
+    """Run the demo and say how it went; returns the exit code. The executable is sweep_demo, see front."""
     isolate()
     rclpy.init(args=[])
     try:
-        good = run(arguments.output)
-    except NoReply as error:
+        good = run(picture)
+    except (NoReply, OSError) as error:
         print(f"\ndemo failed: {error}", file=sys.stderr)
         return 1
     finally:
         rclpy.try_shutdown()
     print("demo passed" if good else "demo failed: a tip is too far from its reference")
     return 0 if good else 1
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -44,7 +44,6 @@ def save_picture(sweeps: Sequence[Curves], path: Path) -> None:
     figure.legend(*axes[0].get_legend_handles_labels(), loc="upper center")
     bar = figure.add_axes((0.93, 0.2, 0.012, 0.6))
     figure.colorbar(mpl.cm.ScalarMappable(scale, colours), cax=bar, label="rotation of the inner tube [deg]")
-    path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path)
 
 
