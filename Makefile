@@ -1,5 +1,5 @@
 # Every target does its own set-up (scripts/setup.sh); a second call finds it done.
-ROBOT ?= config/renda2021.yaml
+export ROBOT ?= config/renda2021.yaml
 IN_ENV := scripts/in_env.sh
 
 .DEFAULT_GOAL := help
@@ -14,8 +14,8 @@ setup: ## ROS 2 (sourced, or a venv), the built workspace and the compiled kerne
 demo: setup ## stream the two sweeps of Fig. 4 through the node, check every tip, draw demo/fig4.png
 	@$(IN_ENV) sweep_demo --output demo
 
-run: setup ## serve equilibria until Ctrl-C; another robot: make run ROBOT=path.yaml
-	@$(IN_ENV) equilibrium_node --ros-args --params-file config/equilibrium_node.yaml -p robot_file:=$(ROBOT)
+run: setup ## serve equilibria until Ctrl-C; another robot: make run ROBOT="its file.yaml"
+	@$(IN_ENV) equilibrium_node --ros-args --params-file config/equilibrium_node.yaml -p "robot_file:='$$ROBOT'"
 
 lint: setup ## style, format and types
 	@$(IN_ENV) python3 -m ruff check .
@@ -41,7 +41,8 @@ bench: setup ## speed against accuracy, measured here and charted: docs/speed_ac
 	@$(IN_ENV) python3 -m bench.node.node_latency
 
 clean: ## remove everything that make has made, compiled kernels in the user's cache among it
-	@.venv/bin/python3 -m ctr_pvs.kernel --remove 2>/dev/null | sed 's/^/rm -rf /' || true
-	rm -rf .venv .ws demo .mypy_cache .pytest_cache .ruff_cache
+	@for venv in .venv .venv-sourced; do \
+		$$venv/bin/python3 -m ctr_pvs.kernel --remove 2>/dev/null | sed 's/^/rm -rf /' || true; done
+	rm -rf .venv .ws .venv-sourced .ws-sourced demo .mypy_cache .pytest_cache .ruff_cache
 	find bench ctr_pvs ctr_pvs_ros test -name __pycache__ -prune -exec rm -rf {} +
 	@echo "the next make sets up anew and compiles the kernels again, which takes some minutes"

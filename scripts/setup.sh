@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Make this folder ready to run: system packages, a venv, the colcon workspace in .ws, and the compiled kernels. Safe to
-# call again: each step is skipped while what it was made from (see the keys below) has not changed.
+# Make this folder ready to run: system packages, a venv, a colcon workspace, and the compiled kernels. Safe to call again:
+# each step is skipped while what it was made from (see the keys below) has not changed.
 set -euo pipefail
 # shellcheck source=scripts/ros_env.sh
 source "$(dirname "${BASH_SOURCE[0]}")/ros_env.sh"
@@ -9,7 +9,23 @@ cd "$ROOT"
 say() { echo "setup: $*"; }
 fail() { echo "setup: $*" >&2; exit 1; }
 
-hash_of() { sha256sum "$@" | sha256sum | cut -d' ' -f1; }
+# colcon, CMake or the search paths of a shell would trip over these, one after the other and late.
+refuse_unusable_folder() {
+  case $ROOT in
+    *[[:space:]:\;\#\$\"\'\\]*)
+      fail "the path of this folder has a space or one of : ; # \$ \" ' \\ in it, which colcon and CMake cannot take;
+    move it: $ROOT" ;;
+  esac
+}
+
+say_which_ros() {
+  if [ "$ROS" = sourced ]; then
+    say "with the sourced ROS 2 Jazzy, in .venv-sourced and .ws-sourced"
+    return
+  fi
+  [ -z "${ROS_DISTRO:-}" ] || say "ROS_DISTRO is $ROS_DISTRO, but Jazzy with colcon and rclpy is not sourced here"
+  say "with ROS 2 Jazzy as Python wheels, in .venv and .ws"
+}
 
 # Interpreters that can make a venv and have the C headers the interface package needs. 3.11 and 3.12 are the versions
 # the wheels were tried with.
@@ -30,7 +46,7 @@ PY
 
 # Debian packages this kind of set-up lacks, one a line.
 missing_packages() {
-  if [ "$1" = wheels ]; then
+  if [ "$ROS" = wheels ]; then
     command -v g++ >/dev/null || echo g++
     command -v cmake >/dev/null || echo cmake
     [ -n "$(usable_python)" ] || printf '%s\n' python3-venv python3-dev
@@ -58,17 +74,20 @@ install_packages() {
 install_wheels() { "$VENV/bin/python3" -m pip install --quiet --no-input --disable-pip-version-check "$@"; }
 
 make_venv() {
-  local ros=$1 python options=() lists=(-r scripts/requirements.txt)
+  local python options=() lists=(-r scripts/requirements.txt)
+  if [ -e "$VENV/made_from" ]; then
+    say "the lists of packages or the place of this folder have changed: making everything anew"
+  fi
   rm -rf "$VENV" "$WORKSPACE"
-  if [ "$ros" = wheels ]; then
+  if [ "$ROS" = wheels ]; then
     python=$(usable_python)
     [ -n "$python" ] || fail "needs Python 3.11 or 3.12 with venv and headers (python3-venv, python3-dev)"
     lists+=(-r scripts/requirements-ros.txt)
-    say "no ROS 2 Jazzy is sourced: installing it as Python wheels into .venv (half a minute or so)"
+    say "installing ROS 2 Jazzy into .venv (half a minute or so)"
   else
     python=/usr/bin/python3
     options=(--system-site-packages)
-    say "using the sourced ROS 2 Jazzy; .venv holds only the checkers and Numba"
+    say "installing the checkers and Numba into .venv-sourced"
   fi
   "$python" -m venv "${options[@]}" "$VENV"
   # All at once, so that Numba gets a numpy that it knows.
@@ -78,7 +97,7 @@ make_venv() {
     say "Numba could not be installed, so kernels run interpreted, slower, with the same numbers. To try again:
     $VENV/bin/python3 -m pip install -r scripts/requirements-compiler.txt"
   fi
-  [ "$ros" != wheels ] || "$VENV/bin/python3" scripts/fix_exported_cmake.py
+  [ "$ROS" != wheels ] || "$VENV/bin/python3" scripts/fix_exported_cmake.py
 }
 
 build_workspace() {
@@ -103,21 +122,21 @@ compile_kernels() {
   fi
 }
 
-ROS=$(ros_source)
+refuse_unusable_folder
+say_which_ros
 
-venv_key="$ROS $(hash_of scripts/requirements*.txt scripts/fix_exported_cmake.py)"
-if [ "$(cat "$VENV/made_from" 2>/dev/null)" != "$venv_key" ]; then
-  mapfile -t missing < <(missing_packages "$ROS")
+if [ "$(cat "$VENV/made_from" 2>/dev/null)" != "$(venv_key)" ]; then
+  mapfile -t missing < <(missing_packages)
   install_packages "${missing[@]}"
-  make_venv "$ROS"
-  echo "$venv_key" >"$VENV/made_from"
+  make_venv
+  venv_key >"$VENV/made_from"
 fi
 
 # Python modules are left out on purpose: they run from the working tree (see enter_workspace).
 workspace_key=$(find ctr_pvs_interfaces config launch test/data package.xml setup.cfg CMakeLists.txt \
   scripts/executable.py.in -type f -print0 | sort -z | xargs -0 sha256sum | cat - "$VENV/made_from" | sha256sum)
 if [ "$(cat "$WORKSPACE/made_from" 2>/dev/null)" != "$workspace_key" ]; then
-  enter_venv "$ROS"
+  enter_venv
   build_workspace
   echo "$workspace_key" >"$WORKSPACE/made_from"
 fi
@@ -126,5 +145,5 @@ fi
 kernels_key=$(find ctr_pvs/kernel -name '*.py' -print0 | sort -z | xargs -0 sha256sum | cat - "$VENV/made_from" | sha256sum)
 mapfile -t kernels < <(cat "$WORKSPACE/kernels_made_from" 2>/dev/null)
 if [ "${kernels[0]:-}" != "$kernels_key" ] || [ ! -e "${kernels[1]:-}/COMPLETE" ]; then
-  (enter_venv "$ROS" && compile_kernels "$kernels_key")
+  (enter_venv && compile_kernels "$kernels_key")
 fi
