@@ -2,7 +2,8 @@
 
 That is the order in which a command travels. commands, wrenches, external_load, stream, outputs and turns hold the
 decisions and know nothing of ROS; messages, forms and markers make what is sent; inputs and publishers are the topics,
-node wires them together, executable runs it. The service has a process of its own.
+node wires them together, executable runs it. The service has a process of its own. In front of them all is front, which
+answers what needs no ROS.
 """
 
 import os
