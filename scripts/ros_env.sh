@@ -37,7 +37,7 @@ enter_venv() {
     unset PYTHONPATH AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE
     export AMENT_PREFIX_PATH=$VENV CMAKE_PREFIX_PATH=$VENV
   else
-    # The node's script names the system's Python, which does not look into the venv by itself; Numba lies there.
+    # Where the node's script names the system's Python, that does not look into the venv by itself; Numba lies there.
     export PYTHONPATH=${PYTHONPATH:+$PYTHONPATH:}$(echo "$VENV"/lib/python3*/site-packages)
   fi
   export VIRTUAL_ENV=$VENV PATH=$VENV/bin:$PATH
