@@ -1,7 +1,8 @@
-"""The checkout as somebody else has it: copied to another place, and an environment that does not know this one."""
+"""The checkout as somebody else has it: what it installs, a copy of it, an environment that does not know this one."""
 
 from __future__ import annotations
 
+import configparser
 import os
 import shutil
 from pathlib import Path
@@ -9,6 +10,14 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 MADE_HERE = (".*", "build", "install", "log", "dist", "demo", "reproduce", "*.egg-info", "__pycache__")
 PATHS = ("PATH", "PYTHONPATH", "LD_LIBRARY_PATH", "AMENT_PREFIX_PATH", "CMAKE_PREFIX_PATH", "COLCON_PREFIX_PATH")
+
+
+def entry_points() -> dict[str, str]:
+    """Executable name -> module:function."""
+    settings = configparser.ConfigParser()
+    settings.read(ROOT / "setup.cfg", encoding="utf-8")
+    scripts = settings["options.entry_points"]["console_scripts"].split("\n")
+    return dict(script.split(" = ") for script in scripts if script)
 
 
 def copy_checkout(to: Path) -> Path:

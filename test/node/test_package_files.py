@@ -1,11 +1,11 @@
 """The launch file, the parameter file and the package files agree with one another. Read as data: no ROS needed."""
 
 import ast
-import configparser
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import yaml
+from checkout import entry_points
 from setuptools import find_packages
 
 ROOT = Path(__file__).parents[2]
@@ -19,14 +19,6 @@ def setup_arguments() -> dict[str, ast.expr]:
     tree = ast.parse((ROOT / "setup.py").read_text(encoding="utf-8"))
     call = next(node for node in ast.walk(tree) if isinstance(node, ast.Call) and ast.unparse(node.func) == "setup")
     return {keyword.arg: keyword.value for keyword in call.keywords}
-
-
-def entry_points() -> dict[str, str]:
-    """Executable name -> module:function."""
-    settings = configparser.ConfigParser()
-    settings.read(ROOT / "setup.cfg", encoding="utf-8")
-    scripts = settings["options.entry_points"]["console_scripts"].split("\n")
-    return dict(script.split(" = ") for script in scripts if script)
 
 
 def package_description(folder: Path) -> ET.Element:

@@ -16,6 +16,7 @@ from ament_index_python.packages import get_package_prefix
 from ament_index_python.packages import get_package_share_directory
 from checkout import ROOT
 from checkout import copy_checkout
+from checkout import entry_points
 from checkout import environment_without
 
 BUILD_TIME = 300.0  # s
@@ -65,7 +66,7 @@ def test_both_packages_are_found(prefix):
 
 def test_executables_run(prefix):
     programs = prefix / "lib" / "ctr_pvs"
-    assert {program.name for program in programs.iterdir()} == {"ctr-pvs", "equilibrium_node", "sweep_demo"}
+    assert {program.name for program in programs.iterdir()} == set(entry_points())
     for program in programs.iterdir():
         run = sourced(prefix, f"{program} --help")
         assert run.returncode == 0 and f"usage: {program.name}" in run.stdout, run.stderr
