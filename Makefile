@@ -22,10 +22,10 @@ lint: setup ## style, format and types
 	@$(IN_ENV) python3 -m ruff format --check .
 	@$(IN_ENV) python3 -m mypy
 
-# Tests of the node keep time, so nothing else runs beside them; the others share the processors.
+# Tests that keep time have the machine to themselves; the others share the processors.
 test: lint ## lint, solver tests and node tests
-	@$(IN_ENV) python3 -m pytest --ignore=test/ros -n 2
-	@$(IN_ENV) python3 -m pytest test/ros
+	@$(IN_ENV) python3 -m pytest -m "not soak and not alone" -n 2 --dist loadfile
+	@$(IN_ENV) python3 -m pytest -m "not soak and alone"
 
 soak: setup ## the long tests; SOAK_MINUTES=1 shortens the longest of them, 10 minutes of load
 	@$(IN_ENV) python3 -m pytest -m soak

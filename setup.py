@@ -27,7 +27,7 @@ setup(
     data_files=[
         (f"share/{PACKAGE}", ["package.xml"]),
         (f"share/{PACKAGE}/launch", sorted(glob("launch/*.xml"))),
-        (f"share/{PACKAGE}/config", sorted(glob("config/*.yaml"))),
+        (f"share/{PACKAGE}/config", sorted(glob("config/*.yaml") + glob("config/*.rviz") + glob("config/*.json"))),
         (f"share/{PACKAGE}/data", ["test/data/reference_values.json"]),
     ],
     # Numba is not in package.xml: some releases of Ubuntu have no package of it, and the solver runs without, slower.

@@ -1,9 +1,8 @@
-"""The ROS 2 node around ctr_pvs: parameters, inputs, commands, wrenches, stream, outputs, report, node; and a service.
+"""The ROS 2 node around ctr_pvs, its service, and clients.
 
-That is the order in which a command travels. commands, wrenches, external_load, stream, outputs and turns hold the
-decisions and know nothing of ROS; messages, forms and markers make what is sent; inputs and publishers are the topics,
-node wires them together, executable runs it. The service has a process of its own. In front of them all is front, which
-answers what needs no ROS.
+A command comes in through inputs, where it is read and checked; stream solves for it and decides whether the answer may
+go out; outputs sends that, and what became of the command. handler holds the three together. The service has a process
+of its own. parameters, node, executable and front make one program of it all; client is for who talks to a node.
 """
 
 import os

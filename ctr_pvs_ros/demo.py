@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from sensor_msgs.msg import JointState
 
 from ctr_pvs_interfaces.srv import SolveEquilibrium
-from ctr_pvs_ros.client import LockStepClient
-from ctr_pvs_ros.client import NoReply
-from ctr_pvs_ros.client import Reply
+from ctr_pvs_ros.client.client import LockStepClient
+from ctr_pvs_ros.client.client import NoReply
+from ctr_pvs_ros.client.client import Reply
 from ctr_pvs_ros.demo_picture import Curves
 from ctr_pvs_ros.demo_picture import save_picture
 from ctr_pvs_ros.process import NodeProcess

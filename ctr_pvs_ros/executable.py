@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import signal
+import sys
 
 import rclpy
 from rclpy.exceptions import ParameterException
@@ -12,6 +13,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.logging import get_logger
 from rclpy.signals import SignalHandlerOptions
 
+from ctr_pvs_ros.arguments import check_parameters_given
 from ctr_pvs_ros.node import NODE_NAME
 from ctr_pvs_ros.node import EquilibriumNode
 
@@ -19,6 +21,7 @@ EXIT_BAD_INPUT = 2
 # What a wrong parameter, robot file, or ROS argument (rclpy's RCLError is a RuntimeError) ends in.
 START_FAULTS = (ParameterException, RuntimeError, ValueError)
 WAKE_PERIOD = 0.1  # s; a signal is seen at the latest after this time
+SWITCH_INTERVAL = 5e-5  # s; the stream waits no longer for a thread that makes a response
 
 
 def main(args: list[str] | None = None) -> int:
@@ -30,8 +33,8 @@ def main(args: list[str] | None = None) -> int:
         log an exception, so there the node ends as soon as the executor comes round."""
         if node is None:
             raise KeyboardInterrupt
-        node.interrupted = True
-        if node.solving:
+        node.handler.interrupted = True
+        if node.handler.solving:
             raise KeyboardInterrupt
 
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -40,6 +43,7 @@ def main(args: list[str] | None = None) -> int:
         try:
             rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
             node = EquilibriumNode()
+            check_parameters_given(sys.argv if args is None else args, node)
         except START_FAULTS as error:
             get_logger(NODE_NAME).fatal(f"not started: {error}")
             return EXIT_BAD_INPUT
@@ -60,9 +64,10 @@ def _spin(node: EquilibriumNode) -> None:
     # What is there by now stays: the garbage collector need not look through it again while commands wait.
     gc.collect()
     gc.freeze()
+    sys.setswitchinterval(SWITCH_INTERVAL)
     executor = new_executor()
     executor.add_node(node)
-    while rclpy.ok() and not node.interrupted:
+    while rclpy.ok() and not node.handler.interrupted:
         executor.spin_once(timeout_sec=WAKE_PERIOD)
 
 

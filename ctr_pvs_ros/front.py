@@ -15,6 +15,8 @@ from pathlib import Path
 from typing import NoReturn
 
 from ctr_pvs.cli.version import declare_version
+from ctr_pvs.cli.words import UsageError
+from ctr_pvs_ros.client import words as client_words
 
 EXIT_BAD_INPUT = 2
 ENTRY = textwrap.TextWrapper(110, initial_indent="  ", subsequent_indent="      ", break_on_hyphens=False)
@@ -85,6 +87,20 @@ def sweep_demo() -> int:
     from ctr_pvs_ros.demo import main
 
     return main(picture)
+
+
+def ctr_client() -> int:
+    """Entry point of the executable ctr_client; returns its exit code."""
+    try:
+        arguments = client_words.parse(sys.argv[1:])
+    except UsageError as error:
+        return _refused("ctr_client", str(error))
+    if not _ros_is_here("ctr_client"):
+        return EXIT_BAD_INPUT
+
+    from ctr_pvs_ros.client.commands import main
+
+    return main(arguments)
 
 
 def without_ros_arguments(words: Sequence[str]) -> list[str]:

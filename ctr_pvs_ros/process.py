@@ -37,6 +37,7 @@ class NodeProcess:
         parameters: values as they stand on the command line, such as {"margin_warn": "0.2"}.
         namespace: such as /left; empty for none.
         log: where the node's output goes; None: where this process's error output goes.
+        parameter_file: None: the one with the defaults.
     """
 
     def __init__(
@@ -45,9 +46,10 @@ class NodeProcess:
         parameters: Mapping[str, str] | None = None,
         namespace: str = "",
         log: IO[bytes] | None = None,
+        parameter_file: Path | None = None,
     ) -> None:
         executable = Path(get_package_prefix("ctr_pvs"), "lib", "ctr_pvs", "equilibrium_node")
-        arguments = ["--params-file", str(share_file("config", "equilibrium_node.yaml"))]
+        arguments = ["--params-file", str(parameter_file or share_file("config", "equilibrium_node.yaml"))]
         for name, value in {"robot_file": str(robot_file), **(parameters or {})}.items():
             arguments += ["-p", f"{name}:={value}"]
         if namespace:

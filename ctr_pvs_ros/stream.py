@@ -12,13 +12,17 @@ from numpy.typing import NDArray
 
 from ctr_pvs import Loads
 from ctr_pvs import Status
-from ctr_pvs_ros.commands import Command
-from ctr_pvs_ros.commands import Reason
-from ctr_pvs_ros.commands import RejectedCommand
+from ctr_pvs_ros.inputs.commands import Command
+from ctr_pvs_ros.inputs.commands import Reason
+from ctr_pvs_ros.inputs.commands import RejectedCommand
 
 if TYPE_CHECKING:
     from ctr_pvs import Equilibrium
     from ctr_pvs import EquilibriumSolver
+
+
+#: Why an answer is withheld, where it is not the solver's status.
+SNAP_HELD, MARGIN_STOP = "snap_held", "margin_stop"
 
 
 @dataclass(frozen=True)
@@ -32,10 +36,12 @@ class Policy:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Whether an answer goes out, and why not or with what warning (empty: nothing to say)."""
+    """Whether an answer goes out, and why not or with what warning (empty: nothing to say); reason: of withholding an
+    answer, in a word."""
 
     publish: bool
     remark: str = ""
+    reason: str = ""
 
 
 @dataclass(frozen=True)
@@ -53,10 +59,12 @@ def judge(equilibrium: Equilibrium, policy: Policy) -> Verdict:
     if not equilibrium.success:
         return Verdict(False, f"{equilibrium.status.value}: {equilibrium.message}; the last answer stays")
     if equilibrium.status is Status.SNAP and policy.on_snap != "follow":
-        return Verdict(False, f"snap held (on_snap is {policy.on_snap}): {equilibrium.message}; the last answer stays")
+        return Verdict(
+            False, f"snap held (on_snap is {policy.on_snap}): {equilibrium.message}; the last answer stays", SNAP_HELD
+        )
     if not (margin > 0.0 and margin >= policy.margin_stop):  # NaN counts as unstable
         rule = f"below margin_stop ({policy.margin_stop:g})" if margin > 0.0 else "not above 0"
-        return Verdict(False, f"stability margin {margin:.3g} is {rule}; the last answer stays")
+        return Verdict(False, f"stability margin {margin:.3g} is {rule}; the last answer stays", MARGIN_STOP)
     if equilibrium.status is Status.SNAP:
         return Verdict(True, f"snap: {equilibrium.message}")
     if margin < policy.margin_warn:

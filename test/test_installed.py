@@ -9,13 +9,15 @@ import tarfile
 import xml.etree.ElementTree as ET
 import zipfile
 from email.parser import Parser
-from importlib.util import find_spec
+from importlib.metadata import distributions
 
 import pytest
 from checkout import ROOT
 from checkout import copy_checkout
 
-MISSING = [module for module in ("pip", "setuptools", "wheel") if find_spec(module) is None]
+# Not by importlib: setuptools puts something of its own in the way of that.
+HERE = {distribution.name for distribution in distributions()}
+MISSING = sorted({"pip", "setuptools", "wheel"} - HERE)
 pytestmark = pytest.mark.skipif(bool(MISSING), reason=f"not installed: {', '.join(MISSING)}")
 
 PIP = (sys.executable, "-m", "pip", "--quiet", "--disable-pip-version-check", "--no-input")
@@ -70,7 +72,9 @@ def wheel(unpacked):
 def prefix(wheel, tmp_path_factory):
     """The folder that the wheel is installed into."""
     folder = tmp_path_factory.mktemp("prefix")
-    run(*PIP, "install", *OFFLINE, "--no-warn-script-location", "--prefix", folder, wheel, cwd=folder)
+    # Also where the same version is on the path, as in a workspace.
+    forced = ("--ignore-installed", "--no-warn-script-location")
+    run(*PIP, "install", *OFFLINE, *forced, "--prefix", folder, wheel, cwd=folder)
     return folder
 
 
@@ -124,7 +128,7 @@ def test_shipped_robots_go_by_name_from_any_folder(prefix, environment):
 def test_the_version_comes_without_what_takes_long_to_load(prefix, environment):
     version = f"ctr_pvs {ET.parse(ROOT / 'package.xml').findtext('version')}\n"
     assert run(sys.executable, "-c", VERSION, cwd="/", environment=environment).stdout == version
-    for name in ("ctr-pvs", "equilibrium_node", "sweep_demo"):
+    for name in ("ctr-pvs", "equilibrium_node", "ctr_client", "sweep_demo"):
         assert run(script(prefix, name), "--version", cwd="/", environment=environment).stdout == version
 
 

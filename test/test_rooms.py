@@ -18,6 +18,27 @@ FRONT = {"__init__", "__main__", "errors"}
 LONGEST = 350  # lines
 FULLEST = 12  # modules in a room, beside __init__
 
+NODE = PACKAGE.parent / "ctr_pvs_ros"
+#: From the ground up: a part of the node uses those before it.
+PARTS = (
+    "parameters",
+    "process",
+    "inputs",
+    "stream",
+    "outputs",
+    "handler",
+    "service",
+    "arguments",
+    "node",
+    "executable",
+    "client",
+    "demo_picture",
+    "demo",
+    "front",
+)
+#: Hold the decisions; they are tried without ROS.
+WITHOUT_ROS = ("inputs/joints", "inputs/commands", "inputs/wrenches", "inputs/external_load", "stream")
+
 
 def modules() -> list[Path]:
     return sorted(PACKAGE.rglob("*.py"))
@@ -107,7 +128,7 @@ def test_plain_rooms_do_without_scipy(path):
 def test_no_module_is_long_and_no_room_is_full():
     lines = {str(path.relative_to(PACKAGE)): len(path.read_text(encoding="utf-8").splitlines()) for path in modules()}
     assert {name: count for name, count in lines.items() if count > LONGEST} == {}
-    folders = [path.parent.name for path in modules() if path.name != "__init__.py"]
+    folders = [path.parent.name for path in (*modules(), *NODE.rglob("*.py")) if path.name != "__init__.py"]
     assert {folder: folders.count(folder) for folder in folders if folders.count(folder) > FULLEST} == {}
 
 
@@ -116,3 +137,23 @@ def test_every_room_says_what_is_in_it_and_holds_nothing_else():
         tree = ast.parse(path.read_text(encoding="utf-8"))
         starts_what_is_compiled = path.parent.name == "kernel"
         assert ast.get_docstring(tree) and (len(tree.body) == 1 or starts_what_is_compiled), path.parent.name
+
+
+def part_of(path: Path) -> str:
+    return path.relative_to(NODE).with_suffix("").parts[0]
+
+
+@pytest.mark.parametrize("path", sorted(NODE.rglob("*.py")), ids=lambda path: str(path.relative_to(NODE)))
+def test_parts_of_the_node_use_those_before_them(path):
+    part, source = part_of(path), path.read_text(encoding="utf-8")
+    allowed = PARTS[: PARTS.index(part) + 1] if part in PARTS else ()
+    names = [name.split(".") for name in imports(source)]
+    assert [name for name in names if name[0] == NODE.name and name[1] not in allowed] == []
+    assert len(source.splitlines()) <= LONGEST
+    assert part != "client" or not [name for name in names if name[0] == NODE.name and name[1] != "client"]
+
+
+@pytest.mark.parametrize("name", WITHOUT_ROS)
+def test_decisions_know_nothing_of_ros(name):
+    tops = {name.partition(".")[0] for name in imports((NODE / f"{name}.py").read_text(encoding="utf-8"))}
+    assert not {top for top in tops if top == "rclpy" or top.endswith(("_msgs", "_interfaces"))}

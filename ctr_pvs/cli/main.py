@@ -17,7 +17,6 @@ from collections.abc import Callable
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
-from typing import NoReturn
 
 from ctr_pvs.answer.status import Status
 from ctr_pvs.cli.loads import declare_loads
@@ -26,9 +25,10 @@ from ctr_pvs.cli.report import answer_as_json
 from ctr_pvs.cli.report import answer_as_text
 from ctr_pvs.cli.stability import declare_stability
 from ctr_pvs.cli.version import declare_version
+from ctr_pvs.cli.words import Parser
 from ctr_pvs.cli.words import UsageError
-from ctr_pvs.cli.words import is_number
 from ctr_pvs.cli.words import number
+from ctr_pvs.cli.words import shielded
 from ctr_pvs.cli.words import whole_number
 from ctr_pvs.errors import FieldError
 from ctr_pvs.errors import RobotFileError
@@ -62,7 +62,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     words = sys.argv[1:] if argv is None else argv
     try:
-        arguments = _parser().parse_args(_shielded(words))
+        arguments = _parser().parse_args(shielded(words))
         run: Callable[[argparse.Namespace], int] = arguments.run
         code = run(arguments)
         sys.stdout.flush()  # here, where a closed pipe can still be answered
@@ -75,7 +75,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return SUCCESS
 
 
-def _declare_solve(subcommands: argparse._SubParsersAction[_Parser]) -> None:
+def _declare_solve(subcommands: argparse._SubParsersAction[Parser]) -> None:
     solve = subcommands.add_parser(
         "solve",
         allow_abbrev=False,
@@ -156,7 +156,7 @@ def _exit_code(equilibrium: Equilibrium) -> int:
     return NO_ANSWER_IN_TIME_OR_TOLERANCE
 
 
-def _declare_reproduce(subcommands: argparse._SubParsersAction[_Parser]) -> None:
+def _declare_reproduce(subcommands: argparse._SubParsersAction[Parser]) -> None:
     reproduction = subcommands.add_parser(
         "reproduce",
         allow_abbrev=False,
@@ -196,15 +196,8 @@ def _reproduce(arguments: argparse.Namespace) -> int:
     return SUCCESS
 
 
-class _Parser(argparse.ArgumentParser):
-    """Says what is wrong in one line, without the usage before it."""
-
-    def error(self, message: str) -> NoReturn:
-        raise UsageError(f"{message} (see {self.prog} --help)")
-
-
-def _parser() -> _Parser:
-    parser = _Parser(
+def _parser() -> Parser:
+    parser = Parser(
         prog="ctr-pvs",
         allow_abbrev=False,
         description="Equilibria of concentric tube robots.",
@@ -215,19 +208,3 @@ def _parser() -> _Parser:
     for declare in (_declare_solve, _declare_reproduce, declare_stability):
         declare(subcommands)
     return parser
-
-
-def _shielded(words: Sequence[str]) -> list[str]:
-    """The words with negative numbers made safe from argparse, which takes -1e-3 and -inf for options.
-
-    A leading space is enough: it is no part of an option's name, and `float` ignores it. `--alpha=-1 0` is cut in two
-    first, because argparse would give `--alpha=...` that one value only.
-    """
-    shielded: list[str] = []
-    for word in words:
-        option, equals, value = word.partition("=")
-        if option.startswith("--") and equals and is_number(value):
-            shielded += [option, f" {value}"]
-        else:
-            shielded.append(f" {word}" if word.startswith("-") and is_number(word) else word)
-    return shielded

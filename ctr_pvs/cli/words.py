@@ -1,15 +1,23 @@
-"""What the subcommands of the command line share: numbers among its words, and the error for words that cannot be
-meant."""
+"""What command lines share: numbers among their words, and words that cannot be meant told of in one line."""
 
 from __future__ import annotations
 
 import argparse
 import math
 from collections.abc import Callable
+from collections.abc import Sequence
+from typing import NoReturn
 
 
 class UsageError(ValueError):
     """Arguments that cannot be meant. The message is one line."""
+
+
+class Parser(argparse.ArgumentParser):
+    """Says what is wrong in one line, without the usage before it."""
+
+    def error(self, message: str) -> NoReturn:
+        raise UsageError(f"{message} (see {self.prog} --help)")
 
 
 def is_number(text: str) -> bool:
@@ -38,3 +46,19 @@ def whole_number(low: int, high: int) -> Callable[[str], int]:
         return int(value)
 
     return parse
+
+
+def shielded(words: Sequence[str]) -> list[str]:
+    """The words with negative numbers made safe from argparse, which takes -1e-3 and -inf for options.
+
+    A leading space is enough: it is no part of an option's name, and `float` ignores it. `--alpha=-1 0` is cut in two
+    first, because argparse would give `--alpha=...` that one value only.
+    """
+    safe: list[str] = []
+    for word in words:
+        option, equals, value = word.partition("=")
+        if option.startswith("--") and equals and is_number(value):
+            safe += [option, f" {value}"]
+        else:
+            safe.append(f" {word}" if word.startswith("-") and is_number(word) else word)
+    return safe

@@ -19,6 +19,7 @@ from ctr_pvs.cli import main as cli
 from ctr_pvs.cli.loads import loads_as_json
 from ctr_pvs.cli.loads import loads_as_line
 from ctr_pvs.cli.loads import loads_in
+from ctr_pvs.cli.words import shielded
 
 ROOT = Path(__file__).parents[2]
 ROBOT = str(ROOT / "config" / "renda2021.yaml")
@@ -28,7 +29,7 @@ FIG4 = [ROBOT, "--alpha", "0", "0", "--D", "0.0935", "0.2085"]  # a boundary of 
 
 def meant(*words: str) -> Loads | None:
     """The loads that words of `ctr-pvs solve` mean."""
-    arguments = cli._parser().parse_args(cli._shielded(["solve", *COMMAND, *words]))
+    arguments = cli._parser().parse_args(shielded(["solve", *COMMAND, *words]))
     return loads_in(arguments, load_robot(ROBOT))
 
 

@@ -5,11 +5,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from ctr_pvs import Loads
-from ctr_pvs_ros import external_load
-from ctr_pvs_ros.external_load import ExternalLoad
-from ctr_pvs_ros.wrenches import RejectedWrench
-from ctr_pvs_ros.wrenches import TipWrench
-from ctr_pvs_ros.wrenches import WrenchReason
+from ctr_pvs_ros.inputs import external_load
+from ctr_pvs_ros.inputs.external_load import ExternalLoad
+from ctr_pvs_ros.inputs.wrenches import RejectedWrench
+from ctr_pvs_ros.inputs.wrenches import TipWrench
+from ctr_pvs_ros.inputs.wrenches import WrenchReason
 
 FORCE, MOMENT = (0.1, 0.0, -0.2), (0.0, 1e-3, 0.0)
 ON_BASE, ON_TIP = (TipWrench(FORCE, MOMENT, in_tip_frame) for in_tip_frame in (False, True))

@@ -58,3 +58,12 @@ def test_a_folder_that_was_only_asked_for_stays_as_it_is(tmp_path):
     (tmp_path / "fig4.png").write_text("the last one")
     front.try_to_write(tmp_path / "fig4.png")
     assert (tmp_path / "fig4.png").read_text() == "the last one"
+
+
+def test_the_client_reads_its_words_before_it_asks_for_ros(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "rclpy", None)
+    for words, told in ((["send", "foo"], "expected JOINT=POSITION"), (["watch"], "no Python package rclpy")):
+        monkeypatch.setattr(sys, "argv", ["ctr_client", *words])
+        assert front.ctr_client() == 2
+        (line,) = capsys.readouterr().err.splitlines()
+        assert line.startswith("ctr_client: ") and told in line

@@ -5,8 +5,8 @@ import math
 import pytest
 from joint_state_fuzz import fuzz
 
-from ctr_pvs_ros.commands import CommandReader
-from ctr_pvs_ros.commands import RejectedCommand
+from ctr_pvs_ros.inputs.commands import CommandReader
+from ctr_pvs_ros.inputs.commands import RejectedCommand
 
 COUNT = 10_000
 LONGEST_LINE = 400  # characters

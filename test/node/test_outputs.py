@@ -4,9 +4,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from ctr_pvs_ros.outputs import Output
-from ctr_pvs_ros.outputs import Outputs
-from ctr_pvs_ros.outputs import Picture
+from ctr_pvs_ros.outputs.outputs import Beacon
+from ctr_pvs_ros.outputs.outputs import Output
+from ctr_pvs_ros.outputs.outputs import Outputs
+from ctr_pvs_ros.outputs.outputs import Picture
 
 
 class Topic:
@@ -38,7 +39,43 @@ def picture():
 
 
 def outputs_of(picture, *topics):
-    return Outputs([Output(topic, topic.encode) for topic in topics], Picture(picture, picture.encode, lambda: "blank"))
+    status, outputs = Output(Topic(), str), [Output(topic, topic.encode) for topic in topics]
+    return Outputs(outputs, status, Picture(picture, picture.encode, lambda: "blank"))
+
+
+def test_a_status_goes_out_for_each_command_and_the_last_one_to_late_joiners(picture):
+    topic = Topic(1)
+    outputs = Outputs([], Output(topic, topic.encode), Picture(picture, picture.encode, lambda: "blank"))
+    for name in "ab":
+        outputs.tell(answer(name))
+    assert topic.messages == ["a", "b"]
+    topic.subscribers = 0
+    for name in "cd":
+        outputs.tell(answer(name))
+    assert topic.encoded == 2
+    outputs.catch_up()
+    assert topic.messages == ["a", "b", "d"]
+
+
+def test_a_beacon_is_lit_again_for_who_joins(picture):
+    topic = Topic(1)
+    beacon = Beacon(topic, topic.encode)
+    outputs = Outputs([beacon], Output(Topic(), str), Picture(picture, picture.encode, lambda: "blank"))
+    outputs.catch_up()
+    outputs.publish(answer("a"))
+    outputs.catch_up()
+    assert topic.messages[-1] == "a"
+    sent = len(topic.messages)
+    outputs.catch_up()
+    assert len(topic.messages) == sent
+    topic.subscribers = 2
+    outputs.catch_up()
+    outputs.catch_up()
+    assert topic.messages[sent:] == ["a"]
+    topic.subscribers = 0
+    outputs.publish(answer("b"))
+    outputs.catch_up()
+    assert topic.messages[-1] == "a"  # nothing is kept waiting for anybody
 
 
 def test_what_nobody_listens_to_is_not_computed(picture):

@@ -1,6 +1,7 @@
 """The launch file, the parameter file and the package files agree with one another. Read as data: no ROS needed."""
 
 import ast
+import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -31,15 +32,16 @@ def needed(package: ET.Element, *kinds: str) -> set[str | None]:
     return {element.text for kind in (*kinds, "depend") for element in package.iter(kind)}
 
 
-def declared_parameters() -> set[str]:
-    """The keys of the table in ctr_pvs_ros/parameters.py."""
+def declared_parameters() -> dict[str, object]:
+    """The names in the table in ctr_pvs_ros/parameters.py, and their defaults."""
     tree = ast.parse((ROOT / "ctr_pvs_ros" / "parameters.py").read_text(encoding="utf-8"))
     table = next(
         node.value
         for node in tree.body
         if isinstance(node, ast.AnnAssign) and ast.unparse(node.target) == "PARAMETERS" and node.value is not None
     )
-    return {ast.literal_eval(key) for key in table.keys}
+    rules = zip(table.keys, table.values, strict=True)
+    return {ast.literal_eval(key): ast.literal_eval(rule.args[0]) for key, rule in rules}
 
 
 def test_every_entry_point_exists():
@@ -56,7 +58,7 @@ def test_the_launch_file_starts_the_node_with_declared_parameters_only():
     assert node.get("exec") in entry_points()
     assert node.get("name") == "ctr_equilibrium"
     names = {element.get("name") for element in launch.iter("param")}
-    assert names - {None} <= declared_parameters() | {"use_sim_time"}
+    assert names - {None} <= set(declared_parameters()) | {"use_sim_time"}
 
 
 def test_every_launch_argument_is_used_and_described():
@@ -84,10 +86,16 @@ def test_files_that_the_launch_file_names_are_installed():
             assert f"glob('{folder}/*{Path(name).suffix}')" in installed
 
 
-def test_the_parameter_file_holds_every_parameter_but_the_ones_without_a_default():
-    content = yaml.safe_load((ROOT / "config" / "equilibrium_node.yaml").read_text(encoding="utf-8"))
-    values = content["/**"]["ros__parameters"]
-    assert set(values) == declared_parameters() - WITHOUT_DEFAULT
+def test_the_parameter_file_shows_every_parameter_and_sets_none():
+    """A value in it would stand where the command line gives one of a wrong type."""
+    text = (ROOT / "config" / "equilibrium_node.yaml").read_text(encoding="utf-8")
+    assert yaml.safe_load(text) == {"/**": {"ros__parameters": {"use_sim_time": False}}}
+    shown = yaml.safe_load(re.sub(r"^    # (?=\w+:)", "    ", text, flags=re.MULTILINE))["/**"]["ros__parameters"]
+    defaults = declared_parameters()
+    assert set(shown) == set(defaults) | {"use_sim_time"}
+    for name, value in shown.items():
+        if name not in WITHOUT_DEFAULT | {"use_sim_time"}:
+            assert value == defaults[name], name
 
 
 def test_what_the_interfaces_need_is_needed_by_the_package_that_builds_them():
@@ -105,7 +113,7 @@ def test_what_the_interfaces_need_is_needed_by_the_package_that_builds_them():
 def test_package_xml_names_every_ros_package_that_is_imported():
     named = needed(package_description(ROOT), "exec_depend")
     imported = set()
-    for path in (ROOT / "ctr_pvs_ros").glob("*.py"):
+    for path in (ROOT / "ctr_pvs_ros").rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.ImportFrom) and node.module:
                 imported.add(node.module.split(".")[0])

@@ -8,9 +8,9 @@ import pytest
 from ctr_pvs import Loads
 from ctr_pvs import Pose
 from ctr_pvs import Status
-from ctr_pvs_ros.commands import Command
-from ctr_pvs_ros.commands import Reason
-from ctr_pvs_ros.commands import RejectedCommand
+from ctr_pvs_ros.inputs.commands import Command
+from ctr_pvs_ros.inputs.commands import Reason
+from ctr_pvs_ros.inputs.commands import RejectedCommand
 from ctr_pvs_ros.stream import Policy
 from ctr_pvs_ros.stream import Stream
 from ctr_pvs_ros.stream import judge

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from ctr_pvs_ros.wrenches import LARGEST_FORCE
-from ctr_pvs_ros.wrenches import LARGEST_MOMENT
-from ctr_pvs_ros.wrenches import RejectedWrench
-from ctr_pvs_ros.wrenches import WrenchReader
-from ctr_pvs_ros.wrenches import WrenchReason
+from ctr_pvs_ros.inputs.wrenches import LARGEST_FORCE
+from ctr_pvs_ros.inputs.wrenches import LARGEST_MOMENT
+from ctr_pvs_ros.inputs.wrenches import RejectedWrench
+from ctr_pvs_ros.inputs.wrenches import WrenchReader
+from ctr_pvs_ros.inputs.wrenches import WrenchReason
 
 READER = WrenchReader("ctr_base", "ctr_tip")
 FORCE, MOMENT = (0.1, -0.2, 0.3), (1e-3, 2e-3, -3e-3)

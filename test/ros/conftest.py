@@ -32,8 +32,8 @@ if HAVE_ROS:
     from rclpy.parameter_client import AsyncParameterClient
     from sensor_msgs.msg import JointState
 
-    from ctr_pvs_ros.client import LATCHED
-    from ctr_pvs_ros.client import LockStepClient
+    from ctr_pvs_ros.client.client import LATCHED
+    from ctr_pvs_ros.client.client import LockStepClient
     from ctr_pvs_ros.process import NodeProcess
     from ctr_pvs_ros.process import isolate
     from ctr_pvs_ros.process import share_file

@@ -21,6 +21,9 @@ def test_two_arms_are_served_side_by_side(graph, find_node):
         for arm in (left, right):
             arm.diagnostics()
         assert [len(messages) for messages in tips] == [1, 0]  # only the left arm has an initial command
+        assert tips[0][0].header.frame_id == "left_base"
+        assert right.get_parameter("frame_id") == "right_base"
+        assert right.get_parameter("robot_file").endswith("three_tubes.yaml")
     finally:
         os.killpg(process.pid, signal.SIGINT)  # as Ctrl-C in a terminal does: launch and the nodes alike
         assert process.wait(10.0) == 0

@@ -10,17 +10,17 @@ from geometry_msgs.msg import PoseStamped
 from geometry_msgs.msg import WrenchStamped
 from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Header
 
 import ctr_pvs
 from ctr_pvs import Loads
 from ctr_pvs_interfaces.srv import SolveEquilibrium
-from ctr_pvs_ros.commands import CommandReader
+from ctr_pvs_ros.inputs.commands import CommandReader
 from ctr_pvs_ros.parameters import LOADED_FIDELITIES
 from ctr_pvs_ros.parameters import LOADED_FORCE_MODELS
 from ctr_pvs_ros.parameters import PARAMETERS
 from ctr_pvs_ros.process import share_file
-from ctr_pvs_ros.service import SolveService
+from ctr_pvs_ros.service.jobs import do
+from ctr_pvs_ros.service.solve_service import job_of
 from ros.load import JOINTS
 from ros.load import faults_in
 from ros.load import joint_state
@@ -284,9 +284,8 @@ def test_the_service_refuses_a_load_that_no_robot_carries(peer, force, moment, w
 )
 def test_loads_are_taken_where_the_solver_takes_them(graph, robot, option, value):
     """By the service, which asks the solver, and by the rule for use_external_wrench, which does not."""
-    service = SolveService(CommandReader(robot), ctr_pvs.EquilibriumSolver(robot, **{option: value}))
     request = SolveEquilibrium.Request(joints=joint_state(JOINTS, POSITIONS), tip_wrench=wrench(FORCE, ZERO))
-    response = service.answer(request, SolveEquilibrium.Response(), Header(), 2, TIMEOUT)
+    solved = do(ctr_pvs.EquilibriumSolver(robot, **{option: value}), job_of(request, CommandReader(robot), 2, TIMEOUT))
     taken = value in (LOADED_FIDELITIES if option == "fidelity" else LOADED_FORCE_MODELS)
-    assert response.status == ("ok" if taken else "bad_input")
-    assert taken or value in response.message
+    assert solved.status == ("ok" if taken else "bad_input")
+    assert taken or value in solved.message

@@ -3,19 +3,19 @@ does not end it, a signal is not outlived by a solve, and diagnostics wait for t
 
 import time
 
+import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Header
 
-from ctr_pvs import load_robot
-from ctr_pvs_interfaces.srv import SolveEquilibrium
-from ctr_pvs_ros.commands import CommandReader
+from ctr_pvs import Loads
+from ctr_pvs_interfaces.msg import EquilibriumStatus
 from ctr_pvs_ros.node import CATCH_UP_PERIOD
 from ctr_pvs_ros.node import EquilibriumNode
 from ctr_pvs_ros.process import share_file
-from ctr_pvs_ros.service import SolveService
+from ctr_pvs_ros.service.jobs import Job
+from ctr_pvs_ros.service.jobs import do
 
 ROBOT = str(share_file("config", "renda2021.yaml"))
 JOINTS = ["outer_rotation", "outer_translation", "inner_rotation", "inner_translation"]
@@ -41,14 +41,20 @@ def command(node):
     """Hand it a command as an executor does."""
     (subscription,) = (each for each in node.subscriptions if each.topic_name == "/faulty/servo_jp")
     subscription.callback(GOOD)
-    status = node._report.status("node", "robot", 0.0)
+    status = node.handler.report.status("node", "robot", 0.0)
     return status, {value.key: value.value for value in status.values}
 
 
 def test_a_broken_solve_is_told_and_the_stream_goes_on(node, monkeypatch):
+    statuses = []
+    monkeypatch.setattr(node._outputs._status, "publish", lambda outcome, message: statuses.append(outcome))
+    monkeypatch.setattr(type(node._outputs._status), "wanted", True)
     with monkeypatch.context() as broken:
-        broken.setattr(node._stream, "_solver", BrokenSolver())
+        broken.setattr(node.handler._stream, "_solver", BrokenSolver())
         status, values = command(node)
+    (told,) = statuses
+    assert (told.code, told.reason) == (EquilibriumStatus.FAILED, "internal_error")
+    assert told.message == "ZeroDivisionError: a mistake; the last answer stays"
     assert status.level == DiagnosticStatus.ERROR
     assert "ZeroDivisionError: a mistake" in status.message
     assert values["internal errors"] == "1"
@@ -59,12 +65,12 @@ def test_a_broken_solve_is_told_and_the_stream_goes_on(node, monkeypatch):
 
 def test_a_command_that_comes_after_the_signal_is_not_solved(node, monkeypatch):
     """Both can find the executor asleep; a solve that began after the signal could not be ended by it."""
-    monkeypatch.setattr(node._stream, "_solver", BrokenSolver())
-    node.interrupted = True
+    monkeypatch.setattr(node.handler._stream, "_solver", BrokenSolver())
+    node.handler.interrupted = True
     _, values = command(node)
     assert values["internal errors"] == "0"
     assert values["commands accepted"] == "0"
-    assert not node.solving
+    assert not node.handler.solving
 
 
 def test_an_answer_that_cannot_be_sent_is_told_and_the_stream_goes_on(node, monkeypatch):
@@ -76,12 +82,12 @@ def test_an_answer_that_cannot_be_sent_is_told_and_the_stream_goes_on(node, monk
     assert command(node)[0].level == DiagnosticStatus.OK
 
 
-def test_the_service_answers_when_its_solver_is_broken(graph):
-    service = SolveService(CommandReader(load_robot(ROBOT)), BrokenSolver())
-    response = service.answer(SolveEquilibrium.Request(joints=GOOD), SolveEquilibrium.Response(), Header(), 60, 1.0)
-    assert not response.success
-    assert response.status == "not_converged"
-    assert "a mistake" in response.message
+def test_the_service_answers_when_its_solver_is_broken():
+    job = Job(7, np.zeros(2), np.zeros(2), Loads(), "cold", 60, time.monotonic() + 1.0)
+    solved = do(BrokenSolver(), job)
+    assert solved.number == 7 and solved.numbers is None
+    assert solved.status == "not_converged"
+    assert "a mistake" in solved.message
 
 
 class Told:

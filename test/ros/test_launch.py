@@ -25,18 +25,21 @@ sys.exit(service.run())
 """
 
 
-@pytest.mark.parametrize("initial_command", ["[0.0, 0.5, 0.0935, 0.2085]", "[]"])
-def test_the_launch_file_starts_the_node(graph, find_node, initial_command):
+@pytest.mark.parametrize(
+    ("name", "initial_command"),
+    [("command", "[0.0, 0.5, 0.0935, 0.2085]"), ("whole_numbers", "[0, 1, 0, 0]"), ("no_command", "[]")],
+)
+def test_the_launch_file_starts_the_node(graph, find_node, name, initial_command):
     given = initial_command != "[]"
-    name = "with_initial_command" if given else "without_initial_command"
     file = str(share_file("launch", "equilibrium.launch.xml"))
-    arguments = [f"namespace:={name}", f"initial_command:={initial_command}"]
+    arguments = [f"namespace:={name}", f"initial_command:={initial_command}", "frame_id:=1", "publish_tf:=true"]
     process = subprocess.Popen([sys.executable, "-c", LAUNCH, file, *arguments], start_new_session=True)
     try:
         peer = find_node(f"/{name}")
         tips = peer.subscribe(PoseStamped, "setpoint_cp")
         peer.diagnostics()
         assert len(tips) == given
+        assert peer.get_parameter("frame_id") == "1" and peer.get_parameter("tip_frame_id") == "ctr_tip"
     finally:
         os.killpg(process.pid, signal.SIGINT)  # as Ctrl-C in a terminal does: launch and the node alike
         assert process.wait(10.0) == 0

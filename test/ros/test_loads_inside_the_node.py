@@ -93,7 +93,7 @@ def seconds(sent):
 
 
 def status_of(node):
-    status = node._report.status("node", "robot", 0.0)
+    status = node.handler.report.status("node", "robot", 0.0)
     return status, {value.key: value.value for value in status.values}
 
 
@@ -106,9 +106,9 @@ def test_by_default_nothing_is_listened_to_and_nothing_told_of_loads(new_node):
 def test_a_wrench_in_the_tips_frame_before_the_first_command_is_turned_with_the_first_answer(new_node, told, robot):
     node = new_node(use_external_wrench=True)
     answers = told(node)
-    node._answer(None, wrench_message(FORCE, MOMENT, "ctr_tip", 7 * SECOND))
+    node.handler.answer(None, wrench_message(FORCE, MOMENT, "ctr_tip", 7 * SECOND))
     assert answers == []
-    node._answer(joint_state(JOINTS, POSITIONS, 8 * SECOND), None)
+    node.handler.answer(joint_state(JOINTS, POSITIONS, 8 * SECOND), None)
     assert [seconds(sent) for sent in answers] == [8, 7]
     unloaded, loaded = (sent.equilibrium for sent in answers)
     assert unloaded.applied_loads is None
@@ -202,8 +202,8 @@ def test_bytes_that_are_no_wrench_cost_no_command(new_node, told, others):
 def test_of_two_inputs_the_bad_one_is_told_and_the_good_one_answered(new_node, told):
     node = new_node(use_external_wrench=True)
     answers = told(node)
-    node._answer(joint_state(JOINTS, POSITIONS, SECOND), wrench_message(FORCE, frame="world", stamp=2 * SECOND))
-    node._answer(joint_state(JOINTS, POSITIONS[:2], 3 * SECOND), wrench_message(FORCE, stamp=4 * SECOND))
+    node.handler.answer(joint_state(JOINTS, POSITIONS, SECOND), wrench_message(FORCE, frame="world", stamp=2 * SECOND))
+    node.handler.answer(joint_state(JOINTS, POSITIONS[:2], 3 * SECOND), wrench_message(FORCE, stamp=4 * SECOND))
     assert [seconds(sent) for sent in answers] == [1, 4]
     assert answers[0].equilibrium.applied_loads is None
     assert answers[1].equilibrium.applied_loads == Loads(FORCE)
@@ -226,19 +226,19 @@ class SnapsUnderLoad(ctr_pvs.EquilibriumSolver):
 @pytest.mark.parametrize("on_snap", ["follow", "hold", "stop"])
 def test_a_load_that_makes_the_tubes_snap_is_dealt_with_as_on_snap_says(new_node, told, robot, monkeypatch, on_snap):
     node = new_node(use_external_wrench=True, on_snap=on_snap)
-    monkeypatch.setattr(node, "_stream", Stream(SnapsUnderLoad(robot)))
+    monkeypatch.setattr(node.handler, "_stream", Stream(SnapsUnderLoad(robot)))
     answers = told(node)
-    node._answer(joint_state(JOINTS, POSITIONS, SECOND), None)
-    node._answer(None, wrench_message((0.0, -0.26, 0.0), stamp=2 * SECOND))
+    node.handler.answer(joint_state(JOINTS, POSITIONS, SECOND), None)
+    node.handler.answer(None, wrench_message((0.0, -0.26, 0.0), stamp=2 * SECOND))
     status, values = status_of(node)
     assert values["last status"] == "snap" and values["snaps"] == "1"
     assert values["external force [N]"] == "(0, -0.26, 0)"
     assert status.level == (DiagnosticStatus.WARN if on_snap == "follow" else DiagnosticStatus.ERROR)
-    node._answer(None, wrench_message(FORCE, stamp=3 * SECOND))
+    node.handler.answer(None, wrench_message(FORCE, stamp=3 * SECOND))
     if on_snap == "stop":  # the load is kept for the command that comes after the release
         assert [seconds(sent) for sent in answers] == [1]
         node.set_parameters([Parameter("on_snap", value="follow")])
-        node._answer(joint_state(JOINTS, POSITIONS, 4 * SECOND), None)
+        node.handler.answer(joint_state(JOINTS, POSITIONS, 4 * SECOND), None)
     assert [seconds(sent) for sent in answers] == {"follow": [1, 2, 3], "hold": [1, 3], "stop": [1, 4]}[on_snap]
     assert answers[-1].equilibrium.applied_loads == Loads(FORCE)
     assert status_of(node)[1]["commands rejected"] == "0"
@@ -249,9 +249,9 @@ def test_a_force_pushes_the_tip_through_a_fold(new_node, told):
     """With the inner tube at 200 deg and D_2 = 170.5 mm a force along -y lets the tubes snap at 0.225 N."""
     node = new_node(use_external_wrench=True)
     answers = told(node)
-    node._answer(joint_state(JOINTS, [0.0, 0.0935, math.radians(200.0), 0.1705], SECOND), None)
+    node.handler.answer(joint_state(JOINTS, [0.0, 0.0935, math.radians(200.0), 0.1705], SECOND), None)
     for number, force in enumerate((0.22, 0.23), 2):
-        node._answer(None, wrench_message((0.0, -force, 0.0), stamp=number * SECOND))
+        node.handler.answer(None, wrench_message((0.0, -force, 0.0), stamp=number * SECOND))
     before, close, landed = (sent.equilibrium for sent in answers)
     assert close.status is Status.OK and landed.status is Status.SNAP
     assert 0.0 < close.stability_margin < before.stability_margin

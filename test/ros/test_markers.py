@@ -1,5 +1,8 @@
 """The tubes as markers: where they are, how thick, and when they go."""
 
+from collections import Counter
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from geometry_msgs.msg import PoseStamped
@@ -9,10 +12,10 @@ from visualization_msgs.msg import MarkerArray
 
 from ctr_pvs import EquilibriumSolver
 from ctr_pvs import load_robot
-from ctr_pvs_ros.markers import TubeMarkers
-from ctr_pvs_ros.markers import diameters
+from ctr_pvs_ros.outputs.markers import TubeMarkers
+from ctr_pvs_ros.outputs.markers import diameters
+from ctr_pvs_ros.outputs.serialized import stamp_bytes
 from ctr_pvs_ros.process import share_file
-from ctr_pvs_ros.serialized import stamp_bytes
 
 JOINTS = ["outer_rotation", "outer_translation", "inner_rotation", "inner_translation"]
 GOOD = dict(zip(JOINTS, (0.0, 0.0935, 0.5, 0.2085), strict=True))
@@ -53,20 +56,33 @@ def test_the_surface_lies_one_radius_around_each_tube(robot):
         points = points_of(marker)
         assert len(points) % 3 == 0
         distance = np.linalg.norm(points[:, None, :] - centres, axis=2).min(axis=1)
-        assert distance == pytest.approx(np.full(len(points), diameter / 2), rel=1e-2)
+        middles = distance < 1e-9
+        assert {tuple(point) for point in points[middles]} == {tuple(centres[0]), tuple(centres[-1])}
+        assert distance[~middles] == pytest.approx(np.full((~middles).sum(), diameter / 2), rel=1e-2)
         tip = centres[-1]
-        assert np.linalg.norm(points - tip, axis=1).min() == pytest.approx(diameter / 2, rel=1e-6)
+        assert np.linalg.norm(points[~middles] - tip, axis=1).min() == pytest.approx(diameter / 2, rel=1e-6)
 
 
-def test_triangles_are_seen_from_outside(robot):
+def test_surfaces_are_closed_and_seen_from_outside(robot):
+    """Every edge belongs to two triangles that go along it in opposite ways; the volume inside is that of a tube."""
     equilibrium = solved(robot, [0.08, 0.15])
-    for tube, marker in enumerate(markers_of(robot, equilibrium)):
+    for marker, diameter, length in zip(
+        markers_of(robot, equilibrium),
+        diameters(robot),
+        [tube.length for tube in robot.tubes] - equilibrium.D,
+        strict=True,
+    ):
         corners = points_of(marker).reshape(-1, 3, 3)
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        centres = equilibrium.tube_backbone(tube, 2000).position
-        middles = corners.mean(axis=1)
-        nearest = centres[np.linalg.norm(middles[:, None, :] - centres, axis=2).argmin(axis=1)]
-        assert (np.sum(normals * (middles - nearest), axis=1) > 0.0).all()
+        edges = Counter(
+            (tuple(start), tuple(end))
+            for triangle in corners.tolist()
+            for start, end in pairwise([*triangle, triangle[0]])
+        )
+        assert set(edges.values()) == {1}
+        assert {(end, start) for start, end in edges} == set(edges)
+        volume = np.linalg.det(corners).sum() / 6.0
+        octagon = 2.0 * np.sqrt(2.0) * (diameter / 2.0) ** 2
+        assert volume == pytest.approx(octagon * length, rel=1e-2)
 
 
 def test_a_tube_that_does_not_come_out_is_deleted(robot):

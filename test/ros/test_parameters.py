@@ -3,6 +3,7 @@
 import dataclasses
 
 import pytest
+import yaml
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PoseStamped
 from sensor_msgs.msg import JointState
@@ -11,6 +12,8 @@ from std_msgs.msg import Float64MultiArray
 from ctr_pvs.solve import solver
 from ctr_pvs_ros.parameters import PARAMETERS
 from ctr_pvs_ros.parameters import Settings
+from ctr_pvs_ros.process import NodeProcess
+from ctr_pvs_ros.process import share_file
 
 JOINTS = ["outer_rotation", "outer_translation", "inner_rotation", "inner_translation"]
 GOOD = dict(zip(JOINTS, (0.0, 0.0935, 0.5, 0.2085), strict=True))
@@ -24,6 +27,8 @@ def other_value(default):
             return not default
         case float():
             return default / 2.0
+        case int():
+            return -default
         case str():
             return f"{default}x"
     return [0.0, 0.5, 0.0935, 0.2085]
@@ -85,7 +90,7 @@ def test_a_command_out_of_limits_is_clamped_and_reported(lenient):
     assert reply.joints.position.tolist() == [0.0, 0.0935, 0.5, 0.3035]
     status, values = lenient.diagnostics()
     assert status.level == DiagnosticStatus.WARN
-    assert "'inner'" in values["last clamping"]
+    assert "inner_translation moved from 0.5 to 0.3035 m" in values["last clamping"]
 
 
 def test_a_nameless_command_is_taken_in_order(lenient):
@@ -131,6 +136,10 @@ def test_an_answer_near_a_fold_is_withheld(strict):
         ("rotation_limits", [0.0, 1.0], "2 tubes"),
         ("rotation_limits", [0.0, 1.0, 1.0, 0.0], "limits.alpha.inner"),
         ("translation_limits", [0.0, float("inf"), 0.0, 1.0], "finite"),
+        ("translation_limits", "none", "array of numbers"),
+        ("translation_limits", [True, False], "array of numbers"),
+        ("translation_limits", ["0", "1"], "array of numbers"),
+        ("translation_limits", 1.0, "array of numbers"),
         *((name, other_value(rule.default), "read-only") for name, rule in PARAMETERS.items() if rule.read_only),
     ],
 )
@@ -150,9 +159,26 @@ def test_limits_may_be_narrowed_while_running(strict):
     _, counts = strict.diagnostics()
     strict.send(JointState(name=JOINTS, position=list(GOOD.values())))
     _, values = strict.diagnostics(lambda values: values["commands rejected"] != counts["commands rejected"])
-    assert values["last rejection"].startswith("out_of_limits: alpha[1]")
+    assert values["last rejection"].startswith("out_of_limits: inner_rotation: ")
+    assert "the parameter rotation_limits" in values["last rejection"]
     assert strict.set_parameter("rotation_limits", [-7.0, 7.0, -7.0, 7.0]).successful
     assert strict.client.command(GOOD, TIMEOUT).joints.position[2] == GOOD["inner_rotation"]
+
+
+def test_limits_may_be_whole_numbers_and_taken_back(strict):
+    assert strict.set_parameter("rotation_limits", [-1, 1, 0, 1]).successful
+    assert strict.get_parameter("rotation_limits") == [-1, 1, 0, 1]
+    strict.send(JointState(name=JOINTS, position=[0.0, 0.0935, -0.5, 0.2085]))
+    strict.diagnostics(lambda values: "inner_rotation: expected 0 <= alpha <= 1 rad" in values["last rejection"])
+    assert strict.set_parameter("rotation_limits", []).successful
+    assert strict.client.command({**GOOD, "inner_rotation": -0.5}, TIMEOUT).joints.position[2] == -0.5
+
+
+def test_every_parameter_has_a_value_also_the_empty_ones(strict, lenient):
+    """One without a value empties the whole of `ros2 param dump`."""
+    for peer in (strict, lenient):
+        for name in PARAMETERS:
+            assert peer.get_parameter(name) is not None, name
 
 
 def test_every_parameter_is_described(strict):
@@ -178,7 +204,55 @@ def test_the_table_and_the_settings_have_the_same_names():
     assert list(PARAMETERS) == [field.name for field in dataclasses.fields(Settings)]
 
 
-def test_the_parameter_file_repeats_the_defaults(strict):
-    """Checked on a running node: what its file sets and no test changes is what the table says."""
-    for name in ("frame_id", "tolerance", "fidelity", "force_model", "publish_backbone_s", "accept_nameless"):
-        assert strict.get_parameter(name) == PARAMETERS[name].default
+def test_whole_numbers_and_none_at_all_are_taken_at_start_up(start_node):
+    peer = start_node("/whole_numbers", initial_command="[0, 1, 0, 0]", rotation_limits="[]", tolerance="1e-6")
+    positions = peer.subscribe(JointState, "setpoint_js")
+    peer.wait(lambda: bool(positions), "initial answer")
+    assert positions[0].position.tolist() == [0.0, 0.0, 1.0, 0.0]
+    assert peer.get_parameter("rotation_limits") == []
+    assert peer.get_parameter("tolerance") == 1e-6
+
+
+def test_unknown_parameters_are_warned_of(start_node):
+    peer = start_node("/misspelt", tolerence="1e-9")
+    told = "no such parameters, passed over: tolerence"
+    peer.wait(lambda: told in peer.log.read_text(encoding="utf-8"), "warning")
+
+
+@pytest.fixture
+def refused(graph, tmp_path):
+    """Start a node that does not start; its exit code and what it says."""
+
+    def refused(content, **parameters):
+        file, log = tmp_path / "parameters.yaml", tmp_path / "log.txt"
+        file.write_text(yaml.safe_dump({"/**": {"ros__parameters": content}}), encoding="utf-8")
+        with log.open("wb") as output:
+            process = NodeProcess(share_file("config", "renda2021.yaml"), parameters, log=output, parameter_file=file)
+        with process:
+            code = process.wait(20.0)
+        return code, log.read_text(encoding="utf-8")
+
+    return refused
+
+
+@pytest.mark.parametrize(
+    ("in_file", "name", "given"),
+    [
+        ({}, "tolerance", "abc"),
+        ({"tolerance": 1e-4}, "tolerance", "abc"),
+        ({"backbone_poses": 5}, "backbone_poses", "7.5"),
+        ({"publish_tf": True}, "publish_tf", "3"),
+        ({"rotation_limits": [-1, 1, -1, 1]}, "rotation_limits", "[-1.5, 1.5, -2.5, 2.5]"),
+        ({"rotation_limits": [-1.0, 1.0, -1.0, 1.0]}, "rotation_limits", "[a, b]"),
+    ],
+)
+def test_what_the_command_line_says_is_never_passed_over(refused, in_file, name, given):
+    code, log = refused(in_file, **{name: given})
+    assert code == 2
+    assert name in log and "not started" in log and "Traceback" not in log
+
+
+def test_a_parameter_file_may_be_overruled(start_node):
+    """With values of the same type."""
+    peer = start_node("/overruled", use_sim_time="false", margin_warn="0.2")
+    assert peer.get_parameter("margin_warn") == 0.2

@@ -6,6 +6,7 @@ import time
 
 import pytest
 import yaml
+from busy_machine import check_in_time
 
 from ctr_pvs_ros.process import NodeProcess
 from ctr_pvs_ros.process import share_file
@@ -13,6 +14,8 @@ from ros.load import ENDLESS
 from ros.load import JOINTS
 from ros.load import NEAR
 from ros.load import joint_state
+
+pytestmark = pytest.mark.alone
 
 ROBOT = share_file("config", "renda2021.yaml")
 LIMIT = 2.0  # s, to refuse a start and to end after a signal
@@ -29,7 +32,7 @@ def refusal(tmp_path, robot_file=ROBOT, **parameters):
     except subprocess.TimeoutExpired:
         process.stop()
         raise
-    assert time.monotonic() - began < LIMIT
+    check_in_time(time.monotonic() - began, LIMIT)
     return code, log.read_text(encoding="utf-8")
 
 
@@ -80,7 +83,7 @@ def test_a_signal_ends_the_node_cleanly(start_node, number, work):
         time.sleep(0.5)
     began = time.monotonic()
     assert peer.process.stop(number) == 0
-    assert time.monotonic() - began < LIMIT
+    check_in_time(time.monotonic() - began, LIMIT)
     assert "Traceback" not in peer.log.read_text(encoding="utf-8")
 
 
@@ -90,4 +93,4 @@ def test_twenty_starts_and_stops(start_node):
         peer = start_node(f"/cycle_{count}")
         began = time.monotonic()
         assert peer.process.stop(signal.SIGTERM if count % 2 else signal.SIGINT) == 0
-        assert time.monotonic() - began < LIMIT
+        check_in_time(time.monotonic() - began, LIMIT)

@@ -9,11 +9,13 @@ from joint_state_fuzz import fuzz
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
-from ctr_pvs_ros.client import NoReply
+from ctr_pvs_ros.client.client import NoReply
 from ros.load import Load
 from ros.load import faults_in
 from ros.load import joint_state
 from ros.load import rejections
+
+pytestmark = pytest.mark.alone
 
 # s between broken commands, in one try of a batch after the other: long enough for the node to take each from its queue
 # of one. A command that is overwritten there by the next, while the machine was busy elsewhere, is not counted, and

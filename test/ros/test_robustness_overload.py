@@ -10,6 +10,8 @@ from ros.load import Load
 from ros.load import faults_in
 from ros.load import joint_state
 
+pytestmark = pytest.mark.alone
+
 TURN = 30.0  # rad, each way
 FACTOR = 10  # commands per solve
 PROBES = 20  # commands in lock step that tell how long one takes

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from busy_machine import check_in_time
 
 from ctr_pvs_ros.process import NodeProcess
 from ctr_pvs_ros.process import share_file
@@ -19,6 +20,8 @@ from ros.load import NEAR
 from ros.load import children
 from ros.load import faults_in
 from ros.load import joint_state
+
+pytestmark = pytest.mark.alone
 
 ROBOT = share_file("config", "renda2021.yaml")
 LIMIT = 2.0  # s, to refuse a start and to end after a signal
@@ -57,7 +60,7 @@ def test_a_wrong_robot_file_is_refused_naming_file_key_value_and_rule(graph, tmp
     began = time.monotonic()
     with log.open("wb") as output, NodeProcess(robot_file, log=output) as process:
         code = process.wait(10.0)
-    assert time.monotonic() - began < LIMIT
+    check_in_time(time.monotonic() - began, LIMIT)
     text = log.read_text(encoding="utf-8")
     assert code == 2
     assert text.count("\n") == 1, text
@@ -91,7 +94,7 @@ def test_ten_stops_in_mid_solve(start_node, number):
         time.sleep(0.1 + 0.05 * count)
         began = time.monotonic()
         assert peer.process.stop(number) == 0
-        assert time.monotonic() - began < LIMIT
+        check_in_time(time.monotonic() - began, LIMIT)
         assert faults_in(peer.log) == []
 
 
@@ -138,5 +141,6 @@ def test_impatience_does_not_spoil_a_clean_end(start_node):
             code = peer.process.wait(0.05)
         except subprocess.TimeoutExpired:
             code = None
+    check_in_time(time.monotonic() - began, LIMIT)
     assert code == 0
     assert faults_in(peer.log) == []

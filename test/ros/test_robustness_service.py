@@ -3,6 +3,7 @@
 import time
 
 import pytest
+from busy_machine import check_in_time
 
 from ctr_pvs_interfaces.srv import SolveEquilibrium
 from ros.load import ENDLESS
@@ -11,6 +12,8 @@ from ros.load import NEAR
 from ros.load import Load
 from ros.load import faults_in
 from ros.load import joint_state
+
+pytestmark = pytest.mark.alone
 
 GOOD = dict(zip(JOINTS, (0.0, 0.0935, 0.5, 0.2085), strict=True))
 BUDGET = 0.4  # s
@@ -59,7 +62,7 @@ def test_an_endless_request_ends_with_the_budget(peer):
     assert not answer.success
     assert answer.status == "timeout"
     assert answer.message
-    assert took < BUDGET + GRACE, f"{answer.solve_time:.3f} s of it solving: {answer.message}"
+    check_in_time(took, BUDGET + GRACE)
 
 
 @pytest.mark.parametrize("names", [JOINTS, JOINTS[:2]])
@@ -69,7 +72,7 @@ def test_the_service_does_not_wait_for_a_stream_that_is_out_of_time(peer, names)
     time.sleep(0.05)
     answer, took = ask(peer, ENDLESS[: len(names)], names)
     assert not answer.success
-    assert took < BUDGET + GRACE
+    check_in_time(took, BUDGET + GRACE)
 
 
 def test_the_stream_goes_on_after_it_ran_out_of_time(peer):
@@ -109,4 +112,4 @@ def test_trouble_in_one_namespace_is_not_seen_in_the_other(peer, other):
     assert counts_after["commands rejected"] == counts["commands rejected"] == "0"
     assert int(counts_after["commands accepted"]) == int(counts["commands accepted"]) + 1
     assert xyz(other.client.command(GOOD, TIMEOUT)) == pytest.approx(xyz(before), abs=1e-9)
-    assert took < BUDGET
+    check_in_time(took, BUDGET)

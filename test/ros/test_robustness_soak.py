@@ -34,6 +34,8 @@ from ros.load import rejections
 from ros.load import resident_memory
 from ros.load import waiting_time
 
+pytestmark = pytest.mark.alone
+
 MINUTES = float(os.environ.get("SOAK_MINUTES", "10"))
 PERIOD = 0.005  # s, between commands
 BROKEN = 100  # one command in so many

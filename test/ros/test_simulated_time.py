@@ -9,6 +9,8 @@ from rosgraph_msgs.msg import Clock
 from ros.load import joint_state
 from ros.load import stamp_of
 
+pytestmark = pytest.mark.alone
+
 JOINTS = ["outer_rotation", "outer_translation", "inner_rotation", "inner_translation"]
 POSITIONS = [0.0, 0.0935, 0.5, 0.2085]
 SECOND = 1_000_000_000  # ns

@@ -14,19 +14,23 @@ from geometry_msgs.msg import PoseStamped
 from numpy.typing import NDArray
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
+from std_msgs.msg import Float64MultiArray
 from std_msgs.msg import Header
+from std_msgs.msg import MultiArrayDimension
+from std_msgs.msg import MultiArrayLayout
 
 from ctr_pvs import Backbone
-from ctr_pvs_ros.commands import joint_positions
-from ctr_pvs_ros.messages import pose_of
-from ctr_pvs_ros.serialized import STAMP
-from ctr_pvs_ros.serialized import Form
-from ctr_pvs_ros.serialized import placeholders
+from ctr_pvs_ros.inputs.joints import Joints
+from ctr_pvs_ros.outputs.messages import pose_of
+from ctr_pvs_ros.outputs.serialized import STAMP
+from ctr_pvs_ros.outputs.serialized import Form
+from ctr_pvs_ros.outputs.serialized import placeholders
 
 if TYPE_CHECKING:
     from ctr_pvs import Equilibrium
 
 PER_POSE = 7  # position and quaternion
+RATES = 6  # of a position and a rotation
 
 
 class NotFinite(ValueError):
@@ -42,15 +46,19 @@ class Forms:
     Every function raises NotFinite rather than pass on a NaN or an infinity.
     """
 
-    def __init__(self, joint_names: tuple[str, ...], frame_id: str) -> None:
+    def __init__(self, joints: Joints, frame_id: str) -> None:
         self._frame_id = frame_id
-        count = len(joint_names)
+        self._in_turn = joints.in_turn
+        names = list(joints.names)
+        count = len(names)
         positions, efforts = placeholders(count), placeholders(count, run=1)
-        joints = JointState(header=Header(stamp=STAMP), name=list(joint_names), position=positions, effort=efforts)
-        self._joints = Form(joints, (STAMP, positions, efforts))
+        joint_state = JointState(header=Header(stamp=STAMP), name=names, position=positions, effort=efforts)
+        self._joints = Form(joint_state, (STAMP, positions, efforts))
         self._doubles = struct.Struct(f"={count}d")
         numbers = placeholders(PER_POSE)
         self._tip = Form(PoseStamped(header=self._header(), pose=_pose(numbers)), (STAMP, numbers))
+        rates = placeholders(RATES * count)
+        self._jacobian = Form(Float64MultiArray(layout=_layout(names), data=rates), (rates,))
         self._margin = Form(Float64(data=placeholders(1)[0]), (placeholders(1),))
         self._backbone = lru_cache(maxsize=1)(self._backbone_form)
 
@@ -60,10 +68,17 @@ class Forms:
 
     def joints(self, equilibrium: Equilibrium, stamp: bytes) -> bytes:
         """sensor_msgs/JointState: the solved command [rad and m], with torque and force as effort [N m and N]."""
-        effort = joint_positions(equilibrium.torque, equilibrium.force)
+        effort = self._in_turn(equilibrium.torque, equilibrium.force)
         _finite(sum(effort), "loads")
-        position = joint_positions(equilibrium.alpha, equilibrium.D)
+        position = self._in_turn(equilibrium.alpha, equilibrium.D)
         return self._joints.fill(stamp, self._doubles.pack(*position), self._doubles.pack(*effort))
+
+    def jacobian(self, equilibrium: Equilibrium) -> bytes:
+        """std_msgs/Float64MultiArray: rates of the tip [m and rad], row by row, by the joints [rad and m] in turn."""
+        of_alpha, of_D = np.split(equilibrium.jacobian, 2, axis=1)
+        rates: NDArray[np.float64] = np.array([self._in_turn(*row) for row in zip(of_alpha, of_D, strict=True)])
+        _finite(float(rates.sum()), "jacobian")
+        return self._jacobian.fill(rates.tobytes())
 
     def tip(self, equilibrium: Equilibrium, stamp: bytes) -> bytes:
         """geometry_msgs/PoseStamped: the tip, m."""
@@ -85,6 +100,13 @@ class Forms:
 
     def _header(self) -> Header:
         return Header(stamp=STAMP, frame_id=self._frame_id)
+
+
+def _layout(joint_names: list[str]) -> MultiArrayLayout:
+    """Of 6 rows, each with an entry for every joint; the labels say what they are."""
+    count = len(joint_names)
+    rows = MultiArrayDimension(label="x y z rx ry rz", size=RATES, stride=RATES * count)
+    return MultiArrayLayout(dim=[rows, MultiArrayDimension(label=" ".join(joint_names), size=count, stride=count)])
 
 
 def _pose(numbers: list[float]) -> Pose:

@@ -20,9 +20,9 @@ from visualization_msgs.msg import MarkerArray
 
 from ctr_pvs import Backbone
 from ctr_pvs import Robot
-from ctr_pvs_ros.serialized import STAMP
-from ctr_pvs_ros.serialized import Form
-from ctr_pvs_ros.serialized import placeholders
+from ctr_pvs_ros.outputs.serialized import STAMP
+from ctr_pvs_ros.outputs.serialized import Form
+from ctr_pvs_ros.outputs.serialized import placeholders
 
 if TYPE_CHECKING:
     from ctr_pvs import Equilibrium
@@ -37,10 +37,17 @@ COLOURS = ((0.80, 0.80, 0.84), (0.95, 0.65, 0.20), (0.30, 0.60, 0.90), (0.45, 0.
 
 
 def _faces() -> NDArray[np.intp]:
-    """Corners of the triangles between neighbouring rings, as indices into all corners, ring by ring."""
+    """Corners of all triangles, as indices into the corners of the rings, one ring after the other, and after these the
+    middles of the first and the last ring."""
     ring, side = np.divmod(np.arange((RINGS - 1) * SIDES), SIDES)
     here, beside = ring * SIDES + side, ring * SIDES + (side + 1) % SIDES
-    return np.stack((here, beside, here + SIDES, beside, beside + SIDES, here + SIDES), axis=1).ravel()
+    wall = np.stack((here, beside, here + SIDES, beside, beside + SIDES, here + SIDES), axis=1).ravel()
+    side = np.arange(SIDES)
+    first, next_to_it, middle = side, (side + 1) % SIDES, np.full(SIDES, RINGS * SIDES)
+    start = np.stack((middle, next_to_it, first), axis=1).ravel()
+    to_the_end = (RINGS - 1) * SIDES
+    end = np.stack((middle + 1, first + to_the_end, next_to_it + to_the_end), axis=1).ravel()
+    return np.concatenate((wall, start, end))
 
 
 FACES = _faces()
@@ -49,13 +56,14 @@ CIRCLE = np.stack((np.cos(ANGLES), np.sin(ANGLES)))
 
 
 def tube_surface(backbone: Backbone, diameter: float) -> NDArray[np.float64]:
-    """Corners (len(FACES), 3) [m] of the triangles of a tube, three to each, seen counter-clockwise from outside."""
+    """Corners (len(FACES), 3) [m] of the triangles of a tube with closed ends, three to each, counter-clockwise as seen
+    from outside."""
     x, y, z, w = backbone.orientation.T
     across = np.stack((2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x)), axis=1)
     up = np.stack((2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)), axis=1)
     spokes = np.stack((across, up), axis=2) @ CIRCLE
     corners = backbone.position[:, None, :] + 0.5 * diameter * spokes.transpose(0, 2, 1)
-    return corners.reshape(-1, 3)[FACES]
+    return np.concatenate((corners.reshape(-1, 3), backbone.position[[0, -1]]))[FACES]
 
 
 def diameters(robot: Robot) -> list[float]:

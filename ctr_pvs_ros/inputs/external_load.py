@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ctr_pvs import Loads
-from ctr_pvs_ros.wrenches import RejectedWrench
-from ctr_pvs_ros.wrenches import TipWrench
+from ctr_pvs_ros.inputs.wrenches import RejectedWrench
+from ctr_pvs_ros.inputs.wrenches import TipWrench
 
 Stamp = TypeVar("Stamp")
 

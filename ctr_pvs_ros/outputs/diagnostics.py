@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections import Counter
 from collections import deque
@@ -12,11 +13,11 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from diagnostic_msgs.msg import KeyValue
 
-from ctr_pvs import NoEquilibriumError
 from ctr_pvs import Status
-from ctr_pvs_ros.commands import Command
-from ctr_pvs_ros.commands import RejectedCommand
-from ctr_pvs_ros.external_load import ExternalLoad
+from ctr_pvs_ros.inputs.commands import Command
+from ctr_pvs_ros.inputs.commands import RejectedCommand
+from ctr_pvs_ros.inputs.external_load import ExternalLoad
+from ctr_pvs_ros.outputs.outcomes import snap_reserve
 from ctr_pvs_ros.stream import Answer
 
 if TYPE_CHECKING:
@@ -34,12 +35,14 @@ class Report:
 
     def __init__(self, load: ExternalLoad[Any] | None = None) -> None:
         self._load = load
-        self._counts = Counter(received=0, accepted=0, published=0, rejected=0, clamped=0, snaps=0, zero_stamps=0)
+        self._counts = Counter(
+            received=0, accepted=0, published=0, rejected=0, clamped=0, snaps=0, zero_stamps=0, for_others=0
+        )
         self._reasons: Counter[str] = Counter()
         self._solve_times: deque[float] = deque(maxlen=SOLVE_TIMES_KEPT)
         self._answer: Answer | None = None
         self._last_rejection = ""
-        self._last_clamp = ""
+        self._last_clamp = self._last_hint = ""
         self._last_snap = ""
         self._published: Equilibrium | None = None
         self._fault = ""  # of the node itself; the next answer takes it back
@@ -56,12 +59,20 @@ class Report:
         self._header_age = float("nan") if header_age is None else header_age
         self._counts["zero_stamps"] += header_age is None
 
+    def for_others(self) -> None:
+        """A message came that is none of this robot's business."""
+        self._counts["for_others"] += 1
+
     def rejected(self, rejection: RejectedCommand) -> None:
         """The command changed nothing."""
         self._counts["rejected"] += 1
         self._reasons[rejection.reason.value] += 1
         self._last_rejection = f"{rejection.reason.value}: {rejection}"
         self._news = f"command rejected: {self._last_rejection}"
+
+    def warn(self, text: str) -> None:
+        """Something that is no command's fault deserves a look."""
+        self._news = text
 
     def fault(self, text: str) -> None:
         """Something failed that should not; the last answer stays."""
@@ -89,6 +100,8 @@ class Report:
             self._counts["clamped"] += 1
             self._last_clamp = "; ".join(command.notes)
             self._news = f"command clamped: {self._last_clamp}"
+        if command.hints:
+            self._last_hint = self._news = "; ".join(command.hints)
 
     def status(
         self, name: str, hardware_id: str, command_timeout: float, wrench_timeout: float = 0.0
@@ -139,6 +152,8 @@ class Report:
             "last rejection": self._last_rejection,
             "commands clamped": str(counts["clamped"]),
             "last clamping": self._last_clamp,
+            "last hint": self._last_hint,
+            "messages without joints of this robot": str(counts["for_others"]),
             "snaps": str(counts["snaps"]),
             "last snap, tip before -> after [m]": self._last_snap,
             "internal errors": str(self._faults),
@@ -172,13 +187,9 @@ class Report:
 
 
 def _snap_reserve(equilibrium: Equilibrium) -> str:
-    """Nothing where it is not known: under a moment a state can be stable and have no rates."""
-    if not equilibrium.success:
-        return ""
-    try:
-        return f"{equilibrium.snap_reserve:.4g}"
-    except NoEquilibriumError:
-        return ""
+    """Nothing where it is not known."""
+    reserve = snap_reserve(equilibrium) if equilibrium.success else math.nan
+    return "" if math.isnan(reserve) else f"{reserve:.4g}"
 
 
 def _tip(equilibrium: Equilibrium | None) -> str:

@@ -20,7 +20,7 @@ from std_msgs.msg import MultiArrayDimension
 
 from ctr_pvs import Backbone
 from ctr_pvs.robot.loads import Vector
-from ctr_pvs_ros.commands import joint_positions
+from ctr_pvs_ros.inputs.joints import Joints
 
 if TYPE_CHECKING:
     from ctr_pvs import Equilibrium
@@ -47,13 +47,13 @@ def pose_of(position: NDArray[np.float64], orientation: NDArray[np.float64]) -> 
     return Pose(position=Point(x=x, y=y, z=z), orientation=Quaternion(x=qx, y=qy, z=qz, w=qw))
 
 
-def joint_state_of(equilibrium: Equilibrium, names: tuple[str, ...], header: Header) -> JointState:
-    """The solved command as position [rad and m], torque and force as effort [N m and N]; in the order of `names`."""
+def joint_state_of(equilibrium: Equilibrium, joints: Joints, header: Header) -> JointState:
+    """The solved command as position [rad and m], torque and force as effort [N m and N]; in the order of `joints`."""
     return JointState(
         header=header,
-        name=list(names),
-        position=joint_positions(equilibrium.alpha, equilibrium.D),
-        effort=joint_positions(equilibrium.torque, equilibrium.force),
+        name=list(joints.names),
+        position=joints.in_turn(equilibrium.alpha, equilibrium.D),
+        effort=joints.in_turn(equilibrium.torque, equilibrium.force),
     )
 
 

@@ -1,0 +1,1 @@
+"""For who talks to a node: commands in lock step, and the executable ctr_client."""

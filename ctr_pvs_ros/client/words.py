@@ -1,0 +1,99 @@
+"""What the words of ctr_client mean. Needs no ROS."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Sequence
+
+from ctr_pvs.cli.version import declare_version
+from ctr_pvs.cli.words import Parser
+from ctr_pvs.cli.words import number
+from ctr_pvs.cli.words import shielded
+from ctr_pvs.cli.words import whole_number
+
+ROTATION = "_rotation"
+EXIT_CODES = (
+    "Exit codes: 0 answered, 1 refused, failed or no answer in time, 2 wrong usage or no node, 130 interrupted."
+)
+Joint = tuple[str, float]
+
+
+def parse(words: Sequence[str]) -> argparse.Namespace:
+    """The words after the program's name; raises ctr_pvs.cli's UsageError.
+
+    The result has `command`, which is send, watch or solve, and what that takes; `joints` are in rad and m.
+    """
+    arguments = _parser().parse_args(shielded(_joints_first(words)))
+    if arguments.command != "watch" and arguments.degrees:
+        arguments.joints = [_in_radians(joint) for joint in arguments.joints]
+    arguments.namespace = arguments.namespace.strip("/")
+    return arguments
+
+
+def _joints_first(words: Sequence[str]) -> list[str]:
+    """With the joints right after the subcommand: argparse takes them in one run only."""
+    joints = [word for word in words[1:] if "=" in word and not word.startswith("-")]
+    return [*words[:1], *joints, *(word for word in words[1:] if word not in joints)]
+
+
+def joint(text: str) -> Joint:
+    """NAME=POSITION, for argparse."""
+    name, equals, value = text.partition("=")
+    if not name or not equals:
+        raise argparse.ArgumentTypeError(f"expected JOINT=POSITION, such as inner_rotation=1.0, got {text!r}")
+    try:
+        return name, number(value)
+    except argparse.ArgumentTypeError as error:
+        raise argparse.ArgumentTypeError(f"{name}: {error}") from None
+
+
+def _in_radians(joint: Joint) -> Joint:
+    name, value = joint
+    return name, math.radians(value) if name.endswith(ROTATION) else value
+
+
+def _parser() -> Parser:
+    parser = Parser(
+        prog="ctr_client",
+        allow_abbrev=False,
+        description="Talks with a running equilibrium node.",
+        epilog=EXIT_CODES,
+    )
+    declare_version(parser)
+    subcommands = parser.add_subparsers(metavar="SUBCOMMAND", required=True, dest="command")
+    send = _declared(subcommands, "send", "one command on servo_jp, and what the node says of it")
+    watch = _declared(subcommands, "watch", "a line for each command or wrench as the node tells of it, until Ctrl-C")
+    solve = _declared(subcommands, "solve", "one equilibrium from ~/solve, beside the stream of commands")
+    for subcommand in (send, solve):
+        _declare_joints(subcommand)
+    watch.add_argument("--count", type=whole_number(1, 10**9), metavar="N", help="end after so many lines")
+    solve.add_argument("--warm", action="store_true", help="set out from the service's last answer, not from rest")
+    for kind, letter, unit in (("force", "F", "N"), ("moment", "M", "N m")):
+        axes = tuple(f"{letter}{axis}" for axis in "XYZ")
+        text = f"external {kind} on the tip, along the base's axes [{unit}]"
+        solve.add_argument(f"--{kind}", nargs=3, type=number, default=[0.0] * 3, metavar=axes, help=text)
+    return parser
+
+
+def _declared(subcommands: argparse._SubParsersAction[Parser], name: str, text: str) -> Parser:
+    """A subcommand with the options that all have."""
+    subcommand = subcommands.add_parser(name, allow_abbrev=False, help=text, description=f"{text}.", epilog=EXIT_CODES)
+    subcommand.add_argument("--namespace", default="", metavar="NS", help="namespace of the node (none)")
+    subcommand.add_argument("--node", default="ctr_equilibrium", metavar="NAME", help="name of the node (%(default)s)")
+    subcommand.add_argument("--json", action="store_true", help="one JSON object a line; SI units, null: not known")
+    return subcommand
+
+
+def _declare_joints(subcommand: Parser) -> None:
+    subcommand.add_argument(
+        "joints",
+        nargs="+",
+        type=joint,
+        metavar="JOINT=POSITION",
+        help="<tube>_rotation [rad] or <tube>_translation [m]",
+    )
+    subcommand.add_argument("--degrees", action="store_true", help="rotations are in degrees, in what is printed, too")
+    subcommand.add_argument(
+        "--wait", type=number, default=10.0, metavar="S", help="for the node, and for its answer [s] (%(default)g)"
+    )

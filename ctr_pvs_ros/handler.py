@@ -1,0 +1,178 @@
+"""Commands and loads in, equilibria out, and a status for each: what the node does with what it hears."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import WrenchStamped
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+
+from ctr_pvs import Loads
+from ctr_pvs_interfaces.msg import EquilibriumStatus
+from ctr_pvs_ros.inputs.commands import Command
+from ctr_pvs_ros.inputs.commands import CommandReader
+from ctr_pvs_ros.inputs.commands import Leniency
+from ctr_pvs_ros.inputs.commands import RejectedCommand
+from ctr_pvs_ros.inputs.external_load import ExternalLoad
+from ctr_pvs_ros.inputs.wrenches import RejectedWrench
+from ctr_pvs_ros.inputs.wrenches import WrenchReader
+from ctr_pvs_ros.outputs import messages
+from ctr_pvs_ros.outputs import outcomes
+from ctr_pvs_ros.outputs.diagnostics import Report
+from ctr_pvs_ros.outputs.outputs import Sent
+from ctr_pvs_ros.outputs.publishers import Publishers
+from ctr_pvs_ros.outputs.serialized import stamp_bytes
+from ctr_pvs_ros.parameters import Settings
+from ctr_pvs_ros.stream import Answer
+from ctr_pvs_ros.stream import Policy
+from ctr_pvs_ros.stream import Stream
+
+if TYPE_CHECKING:
+    from ctr_pvs import EquilibriumSolver
+
+LOG_PERIOD = 2.0  # s; at most one line of a kind in this time
+COMMAND, WRENCH = EquilibriumStatus.COMMAND, EquilibriumStatus.WRENCH
+
+
+class Handler:
+    """Answers commands and wrenches one by one.
+
+    Args:
+        node: for its clock and its log.
+        reader, settings: see the attributes.
+        solver: of the stream, and of nothing else.
+        outputs: where answers and statuses go.
+
+    Attributes:
+        reader, settings: may be replaced between commands.
+        report: the account of what came.
+        interrupted: set where a signal asks the node to end.
+        solving: whether a solve is under way.
+    """
+
+    def __init__(
+        self, node: Node, reader: CommandReader, settings: Settings, solver: EquilibriumSolver, outputs: Publishers
+    ) -> None:
+        self.reader, self.settings = reader, settings
+        self.interrupted = self.solving = False
+        self._clock, self._log = node.get_clock(), node.get_logger()
+        self._stream = Stream(solver)
+        self._wrench_reader = WrenchReader(settings.frame_id, settings.tip_frame_id)
+        self._load: ExternalLoad[Time] = ExternalLoad()
+        self._outputs = outputs
+        self.report = Report(self._load if settings.use_external_wrench else None)
+
+    def release(self) -> None:
+        """Accept commands again after a snap under on_snap = stop."""
+        self._stream.release()
+
+    def answer(self, joints: JointState | None, wrench: WrenchStamped | None) -> None:
+        """Solve once for all that came. The answer has the command's stamp; the wrench's, where it alone is good."""
+        if wrench is not None:
+            self._on_wrench(wrench)
+        if joints is not None:
+            self._on_command(joints)
+        load, last = self._load, self._stream.last
+        # A load is kept for the command to come while there is no answer yet, or commands are refused after a snap.
+        if load.unanswered is not None and last is not None and not self._stream.stopped:
+            self._solve(last, load.unanswered, WRENCH)
+
+    def start_with(self, command: Command) -> None:
+        """Answer a command that no message brought."""
+        self._follow(command, self._clock.now().to_msg())
+
+    def _on_wrench(self, message: WrenchStamped) -> None:
+        stamp, _ = self._stamp_for(message.header.stamp)
+        try:
+            wrench = self._wrench_reader.read(message.header.frame_id, *messages.vectors_of(message.wrench))
+        except RejectedWrench as rejection:
+            self._load.rejected(rejection)
+            self._outputs.tell(outcomes.refused(stamp, WRENCH, rejection))
+            self._log.warning(
+                f"wrench rejected: {rejection.reason.value}: {rejection}; the last load is held",
+                throttle_duration_sec=LOG_PERIOD,
+            )
+        else:
+            self._load.accept(wrench, stamp, self._stream.orientation)
+
+    def _on_command(self, message: JointState) -> None:
+        settings = self.settings
+        leniency = Leniency(
+            settings.merge_partial,
+            settings.clamp_to_limits,
+            settings.accept_nameless,
+            settings.ignore_unknown_joints,
+            settings.unwrap_rotations,
+        )
+        if self.reader.is_for_others(message.name, leniency):
+            self.report.for_others()
+            return
+        stamp, age = self._stamp_for(message.header.stamp)
+        self.report.received(age)
+        try:
+            self._follow(self.reader.read(message.name, message.position, leniency, self._stream.last), stamp)
+        except RejectedCommand as rejection:
+            self.report.rejected(rejection)
+            self._outputs.tell(outcomes.refused(stamp, COMMAND, rejection))
+            self._log.warning(
+                f"command rejected: {rejection.reason.value}: {rejection}", throttle_duration_sec=LOG_PERIOD
+            )
+
+    def _stamp_for(self, stamp: Time) -> tuple[Time, float | None]:
+        """The stamp of all that answers a message, and the message's age at receipt [s]; None: it had a zero stamp."""
+        now = self._clock.now()
+        sent = stamp.sec * 1_000_000_000 + stamp.nanosec
+        if sent == 0:
+            return now.to_msg(), None
+        return stamp, (now.nanoseconds - sent) * 1e-9
+
+    def _follow(self, command: Command, stamp: Time) -> None:
+        """Answer a new command."""
+        trigger = COMMAND if self._load.unanswered is None else COMMAND | WRENCH
+        hint = "; ".join(command.notes + command.hints)
+        self._solve(command, stamp, trigger, hint)
+        self.report.accepted(command)
+        if hint:
+            self._log.warning(f"command accepted, but {hint}", throttle_duration_sec=LOG_PERIOD)
+
+    def _solve(self, command: Command, stamp: Time, trigger: int, hint: str = "") -> None:
+        """Solve under the load that acts, and let the answer go where it may."""
+        settings = self.settings
+        policy = Policy(settings.on_snap, settings.margin_warn, settings.margin_stop)
+        loads = self._load.loads
+        with self._failures_told(stamp, trigger):
+            answer = self._interruptible(command, policy, loads)
+            self._load.solved(self._stream.orientation)
+            if answer.verdict.publish:
+                stamped = stamp_bytes(stamp.sec, stamp.nanosec)
+                self._outputs.publish(Sent(answer.equilibrium, stamped, settings.backbone_poses))
+        self._outputs.tell(outcomes.solved(stamp, trigger, answer, loads, hint))
+        self.report.answered(answer)
+        if not answer.verdict.publish:
+            self._log.error(answer.verdict.remark, throttle_duration_sec=LOG_PERIOD)
+        elif answer.verdict.remark:
+            self._log.warning(answer.verdict.remark, throttle_duration_sec=LOG_PERIOD)
+
+    def _interruptible(self, command: Command, policy: Policy, loads: Loads | None) -> Answer:
+        self.solving = True
+        try:
+            if self.interrupted:  # the signal came before there was a solve for it to end
+                raise KeyboardInterrupt
+            return self._stream.follow(command, policy, self.settings.compute_budget, loads)
+        finally:
+            self.solving = False
+
+    @contextmanager
+    def _failures_told(self, stamp: Time, trigger: int) -> Iterator[None]:
+        """A fault of the node itself is told of as the outcome, and goes on to who logs it."""
+        try:
+            yield
+        except RejectedCommand:
+            raise
+        except Exception as error:
+            self._outputs.tell(outcomes.broken(stamp, trigger, f"{type(error).__name__}: {error}"))
+            raise

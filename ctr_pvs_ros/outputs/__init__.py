@@ -1,0 +1,1 @@
+"""What goes out: answers, the status of each command, diagnostics, pictures."""
