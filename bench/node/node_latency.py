@@ -45,12 +45,14 @@ EXECUTORS = {
     "single": "SingleThreadedExecutor",
     "multi": "MultiThreadedExecutor, 2 threads",
 }
-#: What runs, whether its commands slide the tubes, too, and what that is called.
-NODES = [
-    ("node", False, "the node"),
-    ("node", True, "the node, every command also slides the tubes"),
-    ("objects", False, "the node, messages as Python objects"),
-    ("echo", False, "echo, nothing solved"),
+#: What runs, how its client differs from the usual one, and what that is called.
+NODES: list[tuple[str, dict[str, bool], str]] = [
+    ("node", {}, "the node"),
+    ("node", {"sliding": True}, "the node, every command also slides the tubes"),
+    ("node", {"status": True}, "the node, with a listener to its status"),
+    ("loaded", {"loaded": True}, "the node, as many wrenches between the commands"),
+    ("objects", {}, "the node, messages as Python objects"),
+    ("echo", {}, "echo, nothing solved"),
 ]
 
 
@@ -97,13 +99,14 @@ def timed_node(what: str, executor: str) -> Iterator[Measured]:
 
 
 def measure(
-    what: str, executor: str, rate: float, count: int, sliding: bool = False, busy: bool = False
+    what: str, executor: str, rate: float, count: int, busy: bool = False, **options: bool
 ) -> tuple[Run, Measured, str]:
-    """One run; ``busy`` with a client that keeps the service at work all the time, and says what it saw."""
+    """One run with the ``options`` of the client; ``busy`` with another one that keeps the service at work all the
+    time, and says what it saw."""
     node = rclpy.create_node("paced_client")
     said = ""
     with timed_node(what, executor) as measured:
-        client = PacedClient(node, sliding)
+        client = PacedClient(node, **options)
         client.connect()
         if busy:
             load = subprocess.Popen(
@@ -142,9 +145,9 @@ def executors_table(count: int) -> str:
 
 def nodes_table(count: int) -> str:
     rows = []
-    for what, sliding, name in NODES:
+    for what, options, name in NODES:
         for rate in RATES:
-            run, measured, _ = measure(what, "events", rate, count, sliding)
+            run, measured, _ = measure(what, "events", rate, count, **options)
             rows.append(
                 [f"{name}, {rate:.0f} Hz", *row(run, measured), measured.share("solve"), measured.share("publish")]
             )

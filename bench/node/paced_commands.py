@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from geometry_msgs.msg import PoseArray
 from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import WrenchStamped
 from numpy.typing import NDArray
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
@@ -20,6 +21,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
 from bench.node.timed_node import new_executor
+from ctr_pvs_interfaces.msg import EquilibriumStatus
 
 JOINTS = ["outer_rotation", "outer_translation", "inner_rotation", "inner_translation"]
 STAMPED = {"setpoint_js": JointState, "setpoint_cp": PoseStamped, "backbone": PoseArray}
@@ -28,6 +30,8 @@ LOW, HIGH, STEP = 100.0, 110.0, 0.1
 D = (0.0935, 0.1705)
 #: What the tubes slide out with each step where they slide at all [m].
 SLIDE = (3e-5, 1e-4)
+#: On the tip [N], and how far it turns from one message to the next [rad].
+FORCE, WRENCH_TURN = 0.5, 0.01
 #: Offset of the stamp in a serialized message that begins with a header.
 STAMP = struct.Struct("<4xi")
 TIMEOUT = 20.0  # s
@@ -37,9 +41,18 @@ SETTLE = 0.5  # s, before and after a run
 JOINING = 4.0
 
 
+def wrench(number: int) -> bytes:
+    """Serialized force on the tip, which turns about the insertion axis; its stamp is ``number`` seconds."""
+    message = WrenchStamped()
+    message.header.stamp.sec = number
+    force, angle = message.wrench.force, WRENCH_TURN * number
+    force.y, force.z = FORCE * math.cos(angle), FORCE * math.sin(angle)
+    return serialize_message(message)
+
+
 @dataclass(frozen=True)
 class Run:
-    """What came back: the fraction of commands answered, and the age of each complete answer [s], from the command to
+    """What came back: the fraction of messages answered, and the age of each complete answer [s], from the message to
     the arrival of the last of its messages."""
 
     rate: float
@@ -65,17 +78,21 @@ class PacedClient:
     """Sends through ``node`` and listens with raw subscribers, so that decoding is not what is measured.
 
     sliding : whether commands also move the tubes' bases.
+    loaded : whether a wrench goes out halfway between any two commands.
+    status : whether it also listens to ~/status.
     """
 
-    def __init__(self, node: Node, sliding: bool = False) -> None:
+    def __init__(self, node: Node, sliding: bool = False, loaded: bool = False, status: bool = False) -> None:
         self._sliding = sliding
+        self._topics = STAMPED | ({"ctr_equilibrium/status": EquilibriumStatus} if status else {})
         self._arrivals: dict[int, list[float]] = defaultdict(list)
         self._margins = 0
         every = QoSProfile(depth=100)
-        for topic, kind in STAMPED.items():
+        for topic, kind in self._topics.items():
             node.create_subscription(kind, topic, self._keep, every, raw=True)
         node.create_subscription(Float64, "stability_margin", self._count, every, raw=True)
         self._publisher = node.create_publisher(JointState, "servo_jp", 1)
+        self._wrenches = node.create_publisher(WrenchStamped, "external_wrench", 1) if loaded else None
         self._executor = new_executor("events")
         self._executor.add_node(node)
         self._next = 1
@@ -104,7 +121,7 @@ class PacedClient:
         self.spin_until(lambda: self._publisher.get_subscription_count() > 0)
         self.spin_for(SETTLE)
         self._publisher.publish(command(self._number(), self._sliding))
-        self.spin_until(lambda: any(len(arrivals) == len(STAMPED) for arrivals in self._arrivals.values()))
+        self.spin_until(lambda: any(len(arrivals) == len(self._topics) for arrivals in self._arrivals.values()))
         self.spin_for(JOINING)
 
     def _number(self) -> int:
@@ -112,20 +129,27 @@ class PacedClient:
         return self._next - 1
 
     def run(self, rate: float, count: int) -> Run:
-        """``count`` commands, ``rate`` a second. A command that is late is not made up for by a hurried one."""
-        numbers = [self._number() for _ in range(count)]
-        messages = [command(number, self._sliding) for number in numbers]
+        """``count`` commands, ``rate`` a second. A message that is late is not made up for by a hurried one."""
+        messages = []
+        for number in (self._number() for _ in range(count)):
+            messages.append((self._publisher, number, command(number, self._sliding)))
+            if self._wrenches is not None:
+                number = self._number()
+                messages.append((self._wrenches, number, wrench(number)))
+        pace = rate * len(messages) / count
         self.spin_for(SETTLE)
         margins = self._margins
         sent = {}
         due = time.perf_counter()
-        for number, message in zip(numbers, messages, strict=True):
+        for publisher, number, message in messages:
             while (left := due - time.perf_counter()) > 0.0:
                 self._executor.spin_once(timeout_sec=left)
-            due = max(due, time.perf_counter() - 0.5 / rate) + 1.0 / rate
+            due = max(due, time.perf_counter() - 0.5 / pace) + 1.0 / pace
             sent[number] = time.perf_counter()
-            self._publisher.publish(message)
+            publisher.publish(message)
         self.spin_for(SETTLE)
-        complete = {number: self._arrivals[number] for number in numbers if len(self._arrivals[number]) == len(STAMPED)}
+        complete = {
+            number: self._arrivals[number] for number in sent if len(self._arrivals[number]) == len(self._topics)
+        }
         ages = np.array([max(arrivals) - sent[number] for number, arrivals in complete.items()])
-        return Run(rate, min(len(complete), self._margins - margins) / count, ages)
+        return Run(rate, min(len(complete), self._margins - margins) / len(sent), ages)

@@ -1,6 +1,6 @@
 """The node with a stopwatch, and an echo node that solves nothing; each runs in a process of its own.
 
-    python3 -m bench.node.timed_node node|objects|echo events|single|multi FILE
+    python3 -m bench.node.timed_node node|loaded|objects|echo events|single|multi FILE
 
 Until SIGINT; then FILE has, as JSON, the times [s] from the entry of the command callback to the end of the last
 publish, with the parts of them, and u.
@@ -35,12 +35,15 @@ from bench.common.clock import unit
 from bench.common.places import CONFIG
 from ctr_pvs import EquilibriumSolver
 from ctr_pvs import load_robot
-from ctr_pvs_ros import messages
-from ctr_pvs_ros import node as production
-from ctr_pvs_ros.inputs import NEWEST_WINS
-from ctr_pvs_ros.outputs import Output
-from ctr_pvs_ros.outputs import Sent
-from ctr_pvs_ros.publishers import LATE_JOINERS_SEE_THE_LAST
+from ctr_pvs_ros.executable import SWITCH_INTERVAL
+from ctr_pvs_ros.handler import Handler
+from ctr_pvs_ros.inputs.joints import Joints
+from ctr_pvs_ros.inputs.subscriptions import NEWEST_WINS
+from ctr_pvs_ros.node import EquilibriumNode
+from ctr_pvs_ros.outputs import messages
+from ctr_pvs_ros.outputs.outputs import Output
+from ctr_pvs_ros.outputs.outputs import Sent
+from ctr_pvs_ros.outputs.publishers import LATE_JOINERS_SEE_THE_LAST
 from ctr_pvs_ros.stream import Stream
 
 ROBOT = CONFIG / "renda2021.yaml"
@@ -77,14 +80,13 @@ def timed(function: Callable[..., Any], times: list[float]) -> Callable[..., Any
 
 def timed_node(times: Times) -> Node:
     """The production node; only this process's copies of its functions are wrapped."""
-    kind = production.EquilibriumNode
     for owner, name, part in (
-        (kind, "_answer", "in all"),
+        (Handler, "answer", "in all"),
         (Stream, "follow", "solve"),
         (Output, "publish", "publish"),
     ):
         setattr(owner, name, _method(getattr(owner, name), times[part]))
-    return kind()
+    return EquilibriumNode()
 
 
 def _method(function: Callable[..., Any], times: list[float]) -> Callable[..., Any]:
@@ -107,9 +109,9 @@ def with_objects(node: Node) -> Node:
         result.stamp.sec, result.stamp.nanosec = struct.unpack("=iI", sent.stamp)
         return result
 
-    names = node._reader.names
+    joints = node._joints
     kept[0].encode = lambda sent: Float64(data=float(sent.equilibrium.stability_margin))
-    kept[1].encode = lambda sent: messages.joint_state_of(sent.equilibrium, names, header(sent))
+    kept[1].encode = lambda sent: messages.joint_state_of(sent.equilibrium, joints, header(sent))
     kept[2].encode = lambda sent: messages.tip_of(sent.equilibrium, header(sent))
     kept[3].encode = lambda sent: messages.backbone_of(sent.backbone, header(sent))
     return node
@@ -118,11 +120,12 @@ def with_objects(node: Node) -> Node:
 def echo_node(times: Times) -> Node:
     """Answers every command with one prepared answer under the command's stamp: what the middleware costs."""
     node = rclpy.create_node("ctr_equilibrium")
-    equilibrium = EquilibriumSolver(load_robot(ROBOT)).solve([0.0, 1.0], [0.0935, 0.1705])
+    robot = load_robot(ROBOT)
+    equilibrium = EquilibriumSolver(robot).solve([0.0, 1.0], [0.0935, 0.1705])
     header = Header(frame_id="ctr_base")
     outputs = [
         (Float64, "stability_margin", Float64(data=1.0)),
-        (JointState, "setpoint_js", messages.joint_state_of(equilibrium, ("a", "b", "c", "d"), header)),
+        (JointState, "setpoint_js", messages.joint_state_of(equilibrium, Joints.of(robot), header)),
         (PoseStamped, "setpoint_cp", messages.tip_of(equilibrium, header)),
         (PoseArray, "backbone", messages.backbone_of(equilibrium.backbone(60), header)),
     ]
@@ -144,19 +147,21 @@ def echo_node(times: Times) -> Node:
 def main() -> None:
     what, executor_kind, path = sys.argv[1:]
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    rclpy.init(
-        args=["timed", "--ros-args", "-p", f"robot_file:={ROBOT}"], signal_handler_options=SignalHandlerOptions.NO
-    )
+    parameters = {"robot_file": str(ROBOT), "use_external_wrench": str(what == "loaded").lower()}
+    given = [word for name, value in parameters.items() for word in ("-p", f"{name}:={value}")]
+    rclpy.init(args=["timed", "--ros-args", *given], signal_handler_options=SignalHandlerOptions.NO)
     times: Times = {"in all": [], "solve": [], "publish": []}
     node = echo_node(times) if what == "echo" else timed_node(times)
     if what == "objects":
         with_objects(node)
     gc.collect()
     gc.freeze()
+    sys.setswitchinterval(SWITCH_INTERVAL)  # as the executable does
     executor = new_executor(executor_kind)
     executor.add_node(node)
+    handler = getattr(node, "handler", None)
     try:
-        while not getattr(node, "interrupted", False):
+        while not getattr(handler, "interrupted", False):
             executor.spin_once(timeout_sec=0.1)
     except KeyboardInterrupt:
         signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from energy_differences import KINKS
 from energy_differences import kink_robot
+from long_runs import some
 from random_loads import random_loads
 from random_robots import random_D
 from random_robots import random_robot
@@ -101,17 +102,27 @@ def test_compliance_and_load_jacobian_by_differences(seed: int, moments: bool, t
             assert agree(here.load_jacobian[tubes:, column], changed[tubes:])
 
 
-@pytest.mark.parametrize("tubes", [1, 2, 3])
-@pytest.mark.parametrize("seed", range(3))
+MANY = [(seed, 1 + seed % 3) for seed in range(200)]
+
+
+@pytest.mark.parametrize(("seed", "tubes"), some(MANY, range(9)))
 def test_identities_of_forces(seed: int, tubes: int):
-    """d tau / d wrench = -(d tip / dq)^T, and the compliance is symmetric; with moments neither holds."""
-    here = Scene(seed, False, tubes).here
+    """d tau / d wrench = -(d tip / dq)^T, the compliance is symmetric, and so are the rates of torques by rotations."""
+    scene = Scene(seed, False, tubes)
+    here = scene.here
     assert agree(here.load_jacobian, -here.jacobian.T, 1e-6)
     assert agree(here.compliance, here.compliance.T, 1e-6)
     assert np.linalg.eigvalsh(0.5 * (here.compliance + here.compliance.T))[0] > -1e-9
-    other = Scene(seed, True, tubes).here
-    apart = np.abs(other.compliance - other.compliance.T).max()
-    assert apart > 1e-4 * np.abs(other.compliance).max()
+    stiffness = np.column_stack([scene.slope(lambda a: a.torque, TURN, turn=way) for way in np.eye(tubes)])
+    assert agree(stiffness, stiffness.T)
+
+
+@pytest.mark.parametrize("tubes", [1, 2, 3])
+@pytest.mark.parametrize("seed", range(3))
+def test_with_moments_they_do_not_hold(seed: int, tubes: int):
+    here = Scene(seed, True, tubes).here
+    apart = np.abs(here.compliance - here.compliance.T).max()
+    assert apart > 1e-4 * np.abs(here.compliance).max()
 
 
 @pytest.mark.parametrize("seed", range(3))
