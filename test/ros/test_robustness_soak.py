@@ -23,7 +23,9 @@ from geometry_msgs.msg import PoseArray
 from joint_state_fuzz import fuzz
 from rclpy.parameter import Parameter
 from rclpy.parameter_client import AsyncParameterClient
+from std_msgs.msg import Float64MultiArray
 
+from ctr_pvs_interfaces.msg import EquilibriumStatus
 from ctr_pvs_interfaces.srv import SolveEquilibrium
 from ros.load import EVERY_ANSWER
 from ros.load import Load
@@ -32,6 +34,7 @@ from ros.load import faults_in
 from ros.load import joint_state
 from ros.load import rejections
 from ros.load import resident_memory
+from ros.load import stamp_of
 from ros.load import waiting_time
 
 pytestmark = pytest.mark.alone
@@ -82,6 +85,7 @@ class Company:
         self.visits = 0
         self._events = itertools.cycle((self._set, self._visit, self._call, self._set_wrong, self._leave, self._call))
         self._right, self._wrong = itertools.cycle(PARAMETERS), itertools.cycle(WRONG_PARAMETERS)
+        self._sights = itertools.cycle(((PoseArray, "backbone"), (Float64MultiArray, "jacobian")))
         self._count = 0
 
     def step(self):
@@ -113,7 +117,8 @@ class Company:
         self._ask(self._solve.call_async(request), lambda answer: answer.success is not bad and answer.message)
 
     def _visit(self):
-        visitor = self._load.ros.create_subscription(PoseArray, "backbone", lambda _: None, EVERY_ANSWER, raw=True)
+        kind, topic = next(self._sights)
+        visitor = self._load.ros.create_subscription(kind, topic, lambda _: None, EVERY_ANSWER, raw=True)
         self._visitors.append(visitor)
         self.visits += 1
 
@@ -141,16 +146,22 @@ class Account:
         self.status = {}
         self.refusals = Counter()
         self.good = []
+        self.outcomes = {}  # by stamp [ns]
         self._pid = peer.process.id
         self._seconds = seconds
         self._name = f"{peer.namespace.lstrip('/')}/ctr_equilibrium: equilibrium"
         self.load.ros.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 10)
+        name = f"{peer.namespace}/ctr_equilibrium/status"
+        self.load.ros.create_subscription(EquilibriumStatus, name, self._on_status, EVERY_ANSWER)
         self._broken = (message for message in fuzz(6, 10**9) if len(message.reasons) == 1)
 
     def _on_diagnostics(self, message):
         for status in message.status:
             if status.name == self._name:
                 self.status = {value.key: value.value for value in status.values}
+
+    def _on_status(self, message):
+        self.outcomes[stamp_of(message)] = message.outcome
 
     def run(self):
         """The stream and its company; returns when all is said."""
@@ -214,6 +225,13 @@ class Account:
         """How many broken commands the node did not count."""
         return sum(self.refusals.values()) - int(self.status["commands rejected"])
 
+    def untold(self):
+        """How many commands were answered, or counted as refused, and had no status that says so."""
+        good = (EquilibriumStatus.ACCEPTED, EquilibriumStatus.SNAP)
+        answered = sum(self.outcomes.get(stamp) not in good for stamp in self.load.answered)
+        refused = sum(outcome == EquilibriumStatus.REFUSED for outcome in self.outcomes.values())
+        return answered + abs(int(self.status["commands rejected"]) - refused)
+
     def growth(self):
         """Of the node's memory since the warm-up [MB]; None: the run was too short to tell."""
         warm = [sample.memory for sample in self.samples if sample.when > self.samples[0].when + WARM_UP]
@@ -241,6 +259,7 @@ class Account:
             f"command to tip, client included: median {p50:.2f} ms, 99 % {p99:.2f}, 99.9 % {p999:.2f}, "
             f"max {delays[-1] * 1e3:.2f} after {self.load.sent[slowest] - begin:.1f} s",
             f"broken: {sum(self.refusals.values())} sent, {self.uncounted()} of them not counted",
+            f"statuses: {len(self.outcomes)}, {self.untold()} commands answered or refused without one",
             f"beside it: {asked} requests, {len(wrong)} answered wrongly; {self.company.visits} visitors",
             f"memory: {self.samples[0].memory:.1f} MB at first, {self.samples[-1].memory:.1f} MB at last, {grown}",
         )
@@ -249,7 +268,7 @@ class Account:
 
 @pytest.mark.soak
 def test_minutes_of_everything_at_once(start_node, capsys):
-    peer = start_node("/soaked")
+    peer = start_node("/soaked", publish_jacobian="true")
     peer.ros.destroy_node()  # its subscriptions would only cost time
     account = Account(peer, 60.0 * MINUTES)
     account.run()
@@ -263,6 +282,7 @@ def test_minutes_of_everything_at_once(start_node, capsys):
     assert account.surprising() <= math.ceil(RARELY * len(account.good))
     assert not Counter(rejections(account.status)) - account.refusals
     assert account.uncounted() <= sum(account.excused())
+    assert account.untold() == 0
     assert account.status["internal errors"] == "0"
     growth = account.growth()
     assert growth is None or growth < MEMORY_GROWTH
