@@ -26,3 +26,8 @@ def annulus_stiffness(
 def shear_modulus_from_poisson(youngs_modulus: float, poissons_ratio: float) -> float:
     """G = E / (2 (1 + nu)) [Pa] of an isotropic material."""
     return youngs_modulus / (2.0 * (1.0 + poissons_ratio))
+
+
+def torsional_from_poisson(bending_stiffness: float, poissons_ratio: float) -> float:
+    """G J = K / (1 + nu) [N m^2] of any round section with K [N m^2], because J = 2 I."""
+    return bending_stiffness / (1.0 + poissons_ratio)

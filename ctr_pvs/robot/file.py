@@ -10,6 +10,7 @@ from ctr_pvs.errors import RobotFileError
 from ctr_pvs.robot.cross_section import annulus_area
 from ctr_pvs.robot.cross_section import annulus_stiffness
 from ctr_pvs.robot.cross_section import shear_modulus_from_poisson
+from ctr_pvs.robot.cross_section import torsional_from_poisson
 from ctr_pvs.robot.file_table import Table
 from ctr_pvs.robot.robot import DENSITY_RANGE
 from ctr_pvs.robot.robot import DIAMETER_RANGE
@@ -36,7 +37,7 @@ _HELIX = ("curvature", "turn")
 
 _TWO_WAYS = (
     "give youngs_modulus, shear_modulus or poissons_ratio, and both diameters, "
-    "or else bending_stiffness and torsional_stiffness"
+    "or else bending_stiffness and torsional_stiffness or poissons_ratio"
 )
 
 # A coefficient c_k counts as c_k X^k, so its own size says little; this only keeps sums finite.
@@ -63,10 +64,11 @@ def load_robot(path: str | os.PathLike[str]) -> Robot:
           alpha: {outer: [-3.2, 3.2]}                   # rad
           D: {outer: [0.0, 0.15]}                       # m
 
-    In place of the moduli, `bending_stiffness` and `torsional_stiffness` [N m^2] may be given; diameters then only
-    serve to check that tubes fit, and for weight. A segment may give any of these keys again, for itself: for example
-    the stiffnesses of a patterned stretch. A helical segment has `curvature` [1/m] and `turn` [rad/m] in place of the
-    polynomials.
+    In place of the moduli, `bending_stiffness` K and `torsional_stiffness` G J [N m^2] may be given; diameters then only
+    serve to check that tubes fit, and for weight. `poissons_ratio` nu in place of the torsional stiffness stands for
+    G J = K / (1 + nu), which holds for any round section. A segment may give any of these keys again, for itself: for
+    example the stiffnesses of a patterned stretch. A helical segment has `curvature` [1/m] and `turn` [rad/m] in place
+    of the polynomials; where its curvature changes along it, `curvature` is a polynomial, too.
 
     Raises:
         RobotFileError: for anything that cannot be read or breaks a rule, naming file, key path, value and rule.
@@ -135,8 +137,10 @@ def _pre_curvature(table: Table) -> tuple[tuple[complex, ...], float]:
     if helix:
         for key, what in (("curvature", "the helix' curvature in 1/m"), ("turn", "the helix' turn in rad/m")):
             table.require(key, what, "a helix has both; write curvature_y: [...] for a plane arc")
-        curvature = table.number("curvature", -LARGEST_CURVATURE, LARGEST_CURVATURE, "1/m")
-        return (complex(curvature),), table.number("turn", -LARGEST_TURN, LARGEST_TURN, "rad/m")
+        turn = table.number("turn", -LARGEST_TURN, LARGEST_TURN, "rad/m")
+        if isinstance(table.values["curvature"], list):
+            return tuple(map(complex, table.numbers("curvature", -_LARGEST_COEFFICIENT, _LARGEST_COEFFICIENT))), turn
+        return (complex(table.number("curvature", -LARGEST_CURVATURE, LARGEST_CURVATURE, "1/m")),), turn
     y, z = (table.numbers(key, -_LARGEST_COEFFICIENT, _LARGEST_COEFFICIENT) for key in _POLYNOMIAL)
     count = max(len(y), len(z))
     y, z = (values + [0.0] * (count - len(values)) for values in (y, z))
@@ -154,16 +158,23 @@ def _material(table: Table) -> dict[str, float]:
         material.update({key: table.number(key, low, high, unit) for key in keys if key in table})
     if "poissons_ratio" in table:
         material["poissons_ratio"] = _poissons_ratio(table)
-    moduli = [key for key in _MODULI if key in table]
-    stiffnesses = [key for key in _STIFFNESSES if key in table]
-    if moduli and stiffnesses:
-        raise table.error(stiffnesses[0], f"stiffness given one way, but {moduli[0]} is here too", _TWO_WAYS)
-    if "shear_modulus" in table and "poissons_ratio" in table:
-        raise table.error("poissons_ratio", "either shear_modulus or poissons_ratio, not both", "remove one of them")
+    _refuse_two_ways(table)
     if all(key in material for key in _DIAMETERS):
         with table.blamed():
             check_diameters(material["inner_diameter"], material["outer_diameter"])
     return material
+
+
+def _refuse_two_ways(table: Table) -> None:
+    """Raises where one level gives a stiffness twice. A ratio may stand beside the bending stiffness alone."""
+    moduli = [key for key in _MODULI if key in table]
+    stiffnesses = [key for key in _STIFFNESSES if key in table]
+    if moduli == ["poissons_ratio"]:
+        stiffnesses = [key for key in stiffnesses if key == "torsional_stiffness"]
+    if moduli and stiffnesses:
+        raise table.error(stiffnesses[0], f"stiffness given one way, but {moduli[0]} is here too", _TWO_WAYS)
+    if "shear_modulus" in table and "poissons_ratio" in table:
+        raise table.error("poissons_ratio", "either shear_modulus or poissons_ratio, not both", "remove one of them")
 
 
 def _poissons_ratio(table: Table) -> float:
@@ -176,11 +187,14 @@ def _poissons_ratio(table: Table) -> float:
 def _overridden(tube: Mapping[str, float], segment: Mapping[str, float]) -> dict[str, float]:
     """The tube's material with the segment's own in its place, also where that puts it another way.
 
-    Only moduli need room made for them: where stiffnesses are there as well, `_stiffness` looks no further.
+    Only moduli need room made for them: where stiffnesses are there as well, `_stiffness` looks no further. A ratio
+    alone says anew how stiff the same section is in torsion.
     """
     replaced: set[str] = set()
-    if any(key in segment for key in _MODULI):
+    if "youngs_modulus" in segment or "shear_modulus" in segment:
         replaced.update(_STIFFNESSES)
+    if "poissons_ratio" in segment:
+        replaced.add("torsional_stiffness")
     if "shear_modulus" in segment or "poissons_ratio" in segment:
         replaced.update(("shear_modulus", "poissons_ratio"))
     return {key: value for key, value in tube.items() if key not in replaced} | dict(segment)
@@ -199,8 +213,10 @@ def _stiffness(table: Table, material: Mapping[str, float]) -> tuple[float, floa
         with table.blamed():
             check_diameters(inner, outer)
     if any(key in material for key in _STIFFNESSES):
-        bending, torsional = (require(key, "both stiffnesses") for key in _STIFFNESSES)
-        return bending, torsional
+        bending = require("bending_stiffness", "both stiffnesses")
+        if "torsional_stiffness" not in material and "poissons_ratio" in material:
+            return bending, torsional_from_poisson(bending, material["poissons_ratio"])
+        return bending, require("torsional_stiffness", "both stiffnesses")
     youngs_modulus = require("youngs_modulus", "Young's modulus in Pa")
     if "poissons_ratio" in material:
         shear_modulus = shear_modulus_from_poisson(youngs_modulus, material["poissons_ratio"])

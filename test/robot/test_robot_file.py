@@ -68,6 +68,10 @@ def test_limits_go_to_the_tubes_they_name(tmp_path):
         ("{bending_stiffness: 2, torsional_stiffness: 1}", "length: 0.1, bending_stiffness: 3", (3.0, 1.0)),
         ("{}", "length: 0.1, bending_stiffness: 3, torsional_stiffness: 4", (3.0, 4.0)),
         ("{bending_stiffness: 2}", "length: 0.1, torsional_stiffness: 4", (2.0, 4.0)),
+        ("{bending_stiffness: 2, poissons_ratio: 0.25}", "length: 0.1", (2.0, 1.6)),
+        ("{bending_stiffness: 2, poissons_ratio: 0.25}", "length: 0.1, bending_stiffness: 5", (5.0, 4.0)),
+        ("{bending_stiffness: 2, poissons_ratio: 0.25}", "length: 0.1, torsional_stiffness: 4", (2.0, 4.0)),
+        ("{bending_stiffness: 2, torsional_stiffness: 1}", "length: 0.1, poissons_ratio: 0", (2.0, 2.0)),
         # E I = 1 N m^2 with I = pi/64 d^4, d = 0.02 m, so that G J = 2 G / E
         ("{youngs_modulus: &E 1.2732395447351628e8, shear_modulus: *E, inner_diameter: 0, outer_diameter: 0.02}",
          "length: 0.1", (1.0, 2.0)),
@@ -110,6 +114,8 @@ def test_diameters_that_vary_count_with_the_narrowest_bore_and_the_widest_outsid
         ("length: 0.1, curvature_z: [-3]", (-3j,), 0.0),
         ("length: 0.1, curvature_y: [1, 2, 3], curvature_z: [4, 0]", (1 + 4j, 2 + 0j, 3 + 0j), 0.0),
         ("length: 0.1, curvature: 8, turn: -20", (8 + 0j,), -20.0),
+        ("length: 0.1, curvature: [8], turn: -20", (8 + 0j,), -20.0),
+        ("length: 0.03, curvature: [16.7, -550.0], turn: 60", (16.7 + 0j, -550.0 + 0j), 60.0),
     ],
 )
 def test_pre_curvature(tmp_path, segment, curvature, turn):
