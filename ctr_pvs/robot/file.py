@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping
 from dataclasses import replace
@@ -12,6 +13,13 @@ from ctr_pvs.robot.cross_section import annulus_stiffness
 from ctr_pvs.robot.cross_section import shear_modulus_from_poisson
 from ctr_pvs.robot.cross_section import torsional_from_poisson
 from ctr_pvs.robot.file_table import Table
+from ctr_pvs.robot.reading.samples import table_pieces
+from ctr_pvs.robot.reading.units import SEGMENT_KEYS
+from ctr_pvs.robot.reading.units import TUBE_KEYS
+from ctr_pvs.robot.reading.units import limits_of
+from ctr_pvs.robot.reading.units import segment_in_si
+from ctr_pvs.robot.reading.units import segment_tables
+from ctr_pvs.robot.reading.units import tube_in_si
 from ctr_pvs.robot.robot import DENSITY_RANGE
 from ctr_pvs.robot.robot import DIAMETER_RANGE
 from ctr_pvs.robot.robot import LARGEST_CURVATURE
@@ -64,11 +72,20 @@ def load_robot(path: str | os.PathLike[str]) -> Robot:
           alpha: {outer: [-3.2, 3.2]}                   # rad
           D: {outer: [0.0, 0.15]}                       # m
 
-    In place of the moduli, `bending_stiffness` K and `torsional_stiffness` G J [N m^2] may be given; diameters then only
-    serve to check that tubes fit, and for weight. `poissons_ratio` nu in place of the torsional stiffness stands for
-    G J = K / (1 + nu), which holds for any round section. A segment may give any of these keys again, for itself: for
-    example the stiffnesses of a patterned stretch. A helical segment has `curvature` [1/m] and `turn` [rad/m] in place
-    of the polynomials; where its curvature changes along it, `curvature` is a polynomial, too.
+    In place of the moduli, `bending_stiffness` K and `torsional_stiffness` G J [N m^2] may be given; diameters then
+    only serve to check that tubes fit, and for weight. `poissons_ratio` nu in place of the torsional stiffness stands
+    for G J = K / (1 + nu), which holds for any round section. A segment may give any of these keys again, for itself:
+    for example the stiffnesses of a patterned stretch. A helical segment has `curvature` [1/m] and `turn` [rad/m] in
+    place of the polynomials; where its curvature changes along it, `curvature` is a polynomial, too.
+
+    Pre-curvature that was measured: `curvature_table: {s: [..], kappa_y: [..], kappa_z: [..], tolerance: 1e-3}`, or
+    `{file: measured.csv}` with these columns, stands in place of a segment's length and polynomials, or of a tube's
+    segments; s [m] counts from the base of that segment or tube, and the last one is its length. As few polynomial
+    segments as it takes are fitted within the tolerance [1/m].
+
+    Other units and words, only by keys that say so: `length_mm`, `inner_diameter_mm`, `outer_diameter_mm`, a segment's
+    `radius` [m] or `radius_mm` of an arc, 1/curvature_y; `straight_length` and `curved_length` [m], or `_mm`, with one
+    `curvature` or `radius` in place of segments; `alpha_deg` and `D_mm` among the limits.
 
     Raises:
         RobotFileError: for anything that cannot be read or breaks a rule, naming file, key path, value and rule.
@@ -98,34 +115,41 @@ def _file(path: str) -> str:
 
 
 def _tube(table: Table) -> Tube:
-    table.refuse_other_keys(("name", "segments", "density", *_MATERIAL))
+    table.refuse_other_keys(("name", "segments", "density", *_MATERIAL, *TUBE_KEYS, "curvature_table"))
+    table = tube_in_si(table)
     name = table.require("name", "the tube's name")
     material = _material(table)
     stretches = []
-    for entry in table.tables("segments", "segment"):
-        entry.refuse_other_keys(("length", *_POLYNOMIAL, *_HELIX, *_MATERIAL))
+    for written in segment_tables(table):
+        written.refuse_other_keys(("length", *_POLYNOMIAL, *_HELIX, *_MATERIAL, *SEGMENT_KEYS, "curvature_table"))
+        entry = segment_in_si(written)
         stretches.append((entry, _overridden(material, _material(entry))))
     density = table.number("density", *DENSITY_RANGE, "kg/m^3") if "density" in table else None
     vary = len({tuple(values.get(key) for key in _DIAMETERS) for _, values in stretches}) > 1
-    segments = tuple(_segment(entry, values, vary) for entry, values in stretches)
+    segments = tuple(segment for entry, values in stretches for segment in _segments(entry, values, vary))
     inner = [values["inner_diameter"] for _, values in stretches if "inner_diameter" in values]
     outer = [values["outer_diameter"] for _, values in stretches if "outer_diameter" in values]
     with table.blamed():
         return Tube(name, segments, min(inner, default=None), max(outer, default=None), density)
 
 
-def _segment(table: Table, material: Mapping[str, float], diameters_vary: bool) -> Segment:
-    length = table.number("length", *LENGTH_RANGE, "m")
-    coefficients, turn = _pre_curvature(table)
+def _segments(table: Table, material: Mapping[str, float], diameters_vary: bool) -> tuple[Segment, ...]:
+    """One segment, or as many as its curvature table takes."""
+    if "curvature_table" in table:
+        laws = [(piece.length, piece.coefficients, 0.0) for piece in table_pieces(table)]
+    else:
+        laws = [(table.number("length", *LENGTH_RANGE, "m"), *_pre_curvature(table))]
     bending_stiffness, torsional_stiffness = _stiffness(table, material)
     # Where diameters vary, those of the tube are a summary, and the area is the segment's own.
     own_area = diameters_vary and all(key in material for key in _DIAMETERS)
     area = annulus_area(*(material[key] for key in _DIAMETERS)) if own_area else None
     # A law of too much curvature is blamed on the key that makes it.
     written = next((key for key in (*_POLYNOMIAL, "curvature") if key in table), "curvature")
-    blame = {f"curvature[{index}]": written for index in range(len(coefficients))}
+    blame = {f"curvature[{index}]": written for _, law, _ in laws for index in range(len(law))}
     with table.blamed(blame):
-        return Segment(length, bending_stiffness, torsional_stiffness, coefficients, turn, area)
+        return tuple(
+            Segment(length, bending_stiffness, torsional_stiffness, law, turn, area) for length, law, turn in laws
+        )
 
 
 def _pre_curvature(table: Table) -> tuple[tuple[complex, ...], float]:
@@ -227,10 +251,6 @@ def _stiffness(table: Table, material: Mapping[str, float]) -> tuple[float, floa
 
 
 def _limits(table: Table, names: list[str]) -> Limits:
-    table.refuse_other_keys(("alpha", "D"))
-    limits = {}
-    for kind in ("alpha", "D"):
-        entries = table.table(kind)
-        entries.refuse_other_keys(names, "tube")
-        limits[kind] = tuple(entries.values.get(name) for name in names)
-    return Limits(limits["alpha"], limits["D"])
+    table.refuse_other_keys(("alpha", "alpha_deg", "D", "D_mm"))
+    alpha = limits_of(table, "alpha", "alpha_deg", "deg", math.pi / 180.0, names)
+    return Limits(alpha, limits_of(table, "D", "D_mm", "mm", 1e-3, names))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable
 from collections.abc import Iterator
 from collections.abc import Mapping
@@ -12,6 +11,7 @@ from typing import Any
 
 from ctr_pvs.errors import RobotError
 from ctr_pvs.errors import RobotFileError
+from ctr_pvs.robot.reading.hints import remedy
 from ctr_pvs.robot.robot import number_in
 
 
@@ -41,13 +41,12 @@ class Table:
         return RobotFileError(self.file, self.at(key), self.values.get(key), limit, remedy)
 
     def refuse_other_keys(self, known: Iterable[str], what: str = "key") -> None:
-        """Raises for the first key that is not `known`, and suggests the nearest that is."""
+        """Raises for the first key that is not `known`, and says what to write in its place."""
         known = tuple(known)
         for key in self.values:
             if key not in known:
-                near = difflib.get_close_matches(str(key), known, n=1)
-                remedy = f"did you mean {near[0]!r}?" if near else "remove it"
-                raise RobotFileError(self.file, self.at(key), key, f"one of the {what}s {', '.join(known)}", remedy)
+                rule = f"one of the {what}s {', '.join(known)}"
+                raise RobotFileError(self.file, self.at(key), key, rule, remedy(str(key), known))
 
     def require(self, key: str, what: str, remedy: str = "add this key") -> Any:
         """What stands under `key`; raises when nothing does."""

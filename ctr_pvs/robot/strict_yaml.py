@@ -49,7 +49,7 @@ def read_yaml(path: str | os.PathLike[str]) -> Plain:
             mappings, lists, text, numbers, booleans and nulls.
     """
     file = os.fspath(path)
-    text = _read_text(file)
+    text = read_text(file, "a robot file")
     try:
         node = yaml.compose(text, Loader=_CoreSchemaLoader)
         return None if node is None else _Reading(file).plain(node, "")
@@ -63,8 +63,12 @@ def read_yaml(path: str | os.PathLike[str]) -> Plain:
         raise RobotFileError(file, "", "hundreds of levels of nesting", "a robot file") from None
 
 
-def _read_text(file: str) -> str:
-    rule = "a robot file"
+def read_text(file: str, rule: str) -> str:
+    """The text of a file; `rule` is what an error says was expected.
+
+    Raises:
+        RobotFileError: when there is no such file, it is larger than ``LARGEST_FILE``, or it is not UTF-8.
+    """
     try:
         with open(file, "rb") as stream:
             content = stream.read(LARGEST_FILE + 1)
