@@ -23,6 +23,7 @@ from ctr_pvs.errors import CommandError
 from ctr_pvs.errors import LoadError
 from ctr_pvs.errors import RobotError
 from ctr_pvs.errors import RobotFileError
+from ctr_pvs.errors import RobotWarning
 from ctr_pvs.robot.file import load_robot
 from ctr_pvs.robot.loads import Loads
 from ctr_pvs.robot.loads import PointForce
@@ -52,6 +53,7 @@ __all__ = [
     "Robot",
     "RobotError",
     "RobotFileError",
+    "RobotWarning",
     "Segment",
     "Status",
     "Tube",

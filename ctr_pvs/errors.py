@@ -79,3 +79,7 @@ class RobotFileError(ValueError):
 def _sentence(place: str, limit: str, came: str, remedy: str) -> str:
     line = f"{place}: expected {limit}, got {came}"
     return " ".join((f"{line}; {remedy}" if remedy else line).splitlines())
+
+
+class RobotWarning(UserWarning):
+    """A robot that can be, with a number that looks as if it were in another unit. One line."""

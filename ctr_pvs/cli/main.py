@@ -19,8 +19,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ctr_pvs.answer.status import Status
+from ctr_pvs.cli.hints import turn_hints
 from ctr_pvs.cli.loads import declare_loads
 from ctr_pvs.cli.loads import loads_in
+from ctr_pvs.cli.remarks import robot_warnings_told
+from ctr_pvs.cli.remarks import tell
 from ctr_pvs.cli.report import answer_as_json
 from ctr_pvs.cli.report import answer_as_text
 from ctr_pvs.cli.stability import declare_stability
@@ -64,7 +67,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         arguments = _parser().parse_args(shielded(words))
         run: Callable[[argparse.Namespace], int] = arguments.run
-        code = run(arguments)
+        with robot_warnings_told():
+            code = run(arguments)
         sys.stdout.flush()  # here, where a closed pipe can still be answered
         return code
     except (UsageError, FieldError, RobotFileError) as error:
@@ -141,8 +145,11 @@ def _solve(arguments: argparse.Namespace) -> int:
         force_model=arguments.force_model,
     )
     equilibrium = solver.solve(alpha, D, loads=loads, start=arguments.start)
+    hints = turn_hints(solver, equilibrium, arguments.tolerance, loads, arguments.degrees)
+    for hint in hints:
+        tell("hint", hint)
     if arguments.json:
-        print(answer_as_json(robot, equilibrium, arguments.poses))
+        print(answer_as_json(robot, equilibrium, arguments.poses, hints))
     else:
         print(answer_as_text(robot, equilibrium, arguments.degrees))
     return _exit_code(equilibrium)

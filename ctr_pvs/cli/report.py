@@ -16,6 +16,7 @@ from ctr_pvs.answer.status import NoEquilibriumError
 from ctr_pvs.cli.loads import loads_as_json
 from ctr_pvs.cli.loads import loads_as_line
 from ctr_pvs.renda2021.columns import aligned
+from ctr_pvs.robot.plausibility import implausible
 from ctr_pvs.robot.robot import Robot
 
 if TYPE_CHECKING:
@@ -32,13 +33,14 @@ KINK_NOTE = (
 BASE_NOTE = "The base wrench is what the part beyond the orifice exerts there; the guide holds against it."
 
 
-def answer_as_json(robot: Robot, equilibrium: Equilibrium, poses: int) -> str:
+def answer_as_json(robot: Robot, equilibrium: Equilibrium, poses: int, hints: list[str]) -> str:
     """One line of strict JSON in SI units, with null for what is not known.
 
     Args:
         robot: of which it is the equilibrium.
         equilibrium: solved or not.
         poses: number of backbone poses; twists are given at the same arc lengths.
+        hints: what else is worth knowing about the command, a line each.
     """
     parts: dict[str, Callable[[], Any]] = {
         "success": lambda: equilibrium.success,
@@ -63,7 +65,8 @@ def answer_as_json(robot: Robot, equilibrium: Equilibrium, poses: int) -> str:
         "jacobian": lambda: equilibrium.jacobian,
         "compliance": lambda: equilibrium.compliance,
         "force_interval_reversed": lambda: equilibrium.force_interval_reversed,
-        "warnings": lambda: _warnings(robot, equilibrium),
+        "warnings": lambda: implausible(robot) + _warnings(robot, equilibrium),
+        "hints": lambda: hints,
     }
     return json.dumps({key: _strict(_known(part)) for key, part in parts.items()}, allow_nan=False)
 

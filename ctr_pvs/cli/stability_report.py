@@ -11,6 +11,7 @@ import numpy as np
 from ctr_pvs.cli.stability_scan import Scan
 from ctr_pvs.oracles.two_tubes import critical_lambda
 from ctr_pvs.renda2021.columns import aligned
+from ctr_pvs.robot.plausibility import implausible
 
 #: Rows of the sweep that the text shows at most; JSON has all.
 SHOWN = 25
@@ -154,6 +155,7 @@ def scan_as_json(scan: Scan) -> str:
         "curve": _curve(scan),
         "two_tubes": _two_tubes(scan),
         "map": _map_parts(scan),
+        "warnings": implausible(scene.robot),
     }
     return json.dumps(answer, allow_nan=False)
 

@@ -23,6 +23,11 @@ def annulus_stiffness(
     return youngs_modulus * second_moment, shear_modulus * 2.0 * second_moment
 
 
+def annulus_modulus(bending_stiffness: float, inner_diameter: float, outer_diameter: float) -> float:
+    """Young's modulus [Pa] that gives a round tube of these diameters [m] its bending stiffness K [N m^2]."""
+    return bending_stiffness / annulus_stiffness(1.0, 0.0, inner_diameter, outer_diameter)[0]
+
+
 def shear_modulus_from_poisson(youngs_modulus: float, poissons_ratio: float) -> float:
     """G = E / (2 (1 + nu)) [Pa] of an isotropic material."""
     return youngs_modulus / (2.0 * (1.0 + poissons_ratio))

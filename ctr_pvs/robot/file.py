@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import math
 import os
+import warnings
 from collections.abc import Mapping
 from dataclasses import replace
 
 from ctr_pvs.errors import RobotFileError
+from ctr_pvs.errors import RobotWarning
 from ctr_pvs.robot.cross_section import annulus_area
 from ctr_pvs.robot.cross_section import annulus_stiffness
 from ctr_pvs.robot.cross_section import shear_modulus_from_poisson
 from ctr_pvs.robot.cross_section import torsional_from_poisson
 from ctr_pvs.robot.file_table import Table
+from ctr_pvs.robot.plausibility import implausible
 from ctr_pvs.robot.reading.samples import table_pieces
 from ctr_pvs.robot.reading.units import SEGMENT_KEYS
 from ctr_pvs.robot.reading.units import TUBE_KEYS
@@ -89,6 +92,9 @@ def load_robot(path: str | os.PathLike[str]) -> Robot:
 
     Raises:
         RobotFileError: for anything that cannot be read or breaks a rule, naming file, key path, value and rule.
+
+    Warns:
+        RobotWarning: for numbers that look as if they were in another unit, see `robot.plausibility`.
     """
     file = _file(os.fspath(path))
     content = read_yaml(file)
@@ -100,7 +106,10 @@ def load_robot(path: str | os.PathLike[str]) -> Robot:
     tubes = tuple(_tube(table) for table in top.tables("tubes", "tube"))
     with top.blamed():
         robot = Robot(name, tubes)  # so that limits are read against names known to be good
-        return replace(robot, limits=_limits(top.table("limits"), [tube.name for tube in tubes]))
+        robot = replace(robot, limits=_limits(top.table("limits"), [tube.name for tube in tubes]))
+    for remark in implausible(robot):
+        warnings.warn(f"{file}: {remark}", RobotWarning, stacklevel=2)
+    return robot
 
 
 def _file(path: str) -> str:

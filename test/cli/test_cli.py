@@ -25,7 +25,7 @@ REFERENCE = json.loads((ROOT / "test" / "data" / "reference_values.json").read_t
 KEYS = [
     "success", "status", "message", "tip", "backbone", "twist", "torque", "force", "force_interval", "stability_margin",
     "fidelity", "degrees_of_freedom", "error_estimate", "residual", "iterations", "energy", "potential", "loads",
-    "base_wrench", "jacobian", "compliance", "force_interval_reversed", "warnings",
+    "base_wrench", "jacobian", "compliance", "force_interval_reversed", "warnings", "hints",
 ]  # fmt: skip
 FIG4 = ["--D", "0.0935", "0.2085"]  # full overlap; a boundary sits on the orifice
 
@@ -169,7 +169,7 @@ def test_without_equilibrium_the_json_says_no_and_leaves_the_rest_null(capsys):
     assert list(answer) == KEYS
     assert (answer["success"], answer["status"]) == (False, "no_stable_equilibrium")
     assert answer["message"]
-    unknown = set(KEYS) - {"success", "status", "message", "fidelity", "iterations", "warnings"}
+    unknown = set(KEYS) - {"success", "status", "message", "fidelity", "iterations", "warnings", "hints"}
     assert {key for key in KEYS if answer[key] is None} == unknown
 
 
