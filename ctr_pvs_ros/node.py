@@ -23,7 +23,7 @@ from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
-from ctr_pvs import load_robot
+from ctr_pvs.robot.plausibility import implausible
 from ctr_pvs_ros import parameters
 from ctr_pvs_ros.handler import LOG_PERIOD
 from ctr_pvs_ros.handler import Handler
@@ -36,6 +36,7 @@ from ctr_pvs_ros.outputs.publishers import Publishers
 from ctr_pvs_ros.parameters import ParameterError
 from ctr_pvs_ros.parameters import Settings
 from ctr_pvs_ros.service.jobs import SolverOptions
+from ctr_pvs_ros.service.jobs import robot_of
 from ctr_pvs_ros.service.service_process import ServiceProcess
 from ctr_pvs_ros.service.solve_service import SolveService
 
@@ -67,7 +68,7 @@ class EquilibriumNode(Node):
         super().__init__(NODE_NAME, **options)
         unknown = parameters.declare(self)
         self._settings = settings = parameters.read(self)
-        self._robot = load_robot(settings.robot_file)
+        self._robot = robot_of(settings.robot_file)
         self._joints = Joints.of(self._robot, settings.joint_prefix, settings.translation_sign)
         reader = self._new_reader(settings)
         initial = self._initial_command(reader)
@@ -79,6 +80,7 @@ class EquilibriumNode(Node):
         self._process = ServiceProcess(solver_options, self._on_service_trouble)
         self._service = SolveService(self, self._process, reader, settings)
         self.handler = Handler(self, reader, settings, solver, self._outputs)
+        self._tell_of_the_robot()
         if initial is not None:
             self._guarded(self.handler.start_with)(initial)
         self._inputs = Inputs(self, self._on_messages, self._guarded, settings.use_external_wrench)
@@ -114,6 +116,13 @@ class EquilibriumNode(Node):
             meanwhile = " (under way, beside the node)" if compiling.running else ""
             self.get_logger().warning(f"{compiler.why()}{meanwhile}")
         return compiling
+
+    def _tell_of_the_robot(self) -> None:
+        """What looks as if it were in another unit."""
+        remarks = implausible(self._robot)
+        self.handler.report.about_robot(remarks)
+        for remark in remarks:
+            self.get_logger().warning(f"{self._settings.robot_file}: {remark}")
 
     def _on_compiled(self, outcome: str) -> None:
         """In a thread of its own, once it is known whether kernels run compiled from now on."""

@@ -41,6 +41,7 @@ class Report:
         self._reasons: Counter[str] = Counter()
         self._solve_times: deque[float] = deque(maxlen=SOLVE_TIMES_KEPT)
         self._answer: Answer | None = None
+        self._robot_remarks = ""
         self._last_rejection = ""
         self._last_clamp = self._last_hint = ""
         self._last_snap = ""
@@ -51,6 +52,10 @@ class Report:
         self._news = ""  # the last thing to warn of since the last status, even if all went well after it
         self._received = time.monotonic()  # of the last command; until there is one, start-up
         self._header_age = float("nan")
+
+    def about_robot(self, remarks: list[str]) -> None:
+        """What looks wrong in the robot file: told for good, and warned of in the next status."""
+        self._robot_remarks = self._news = "; ".join(remarks)
 
     def received(self, header_age: float | None) -> None:
         """A command came, its stamp `header_age` [s] before its receipt; None: it had a zero stamp."""
@@ -145,6 +150,7 @@ class Report:
     def _count_values(self) -> dict[str, str]:
         counts = self._counts
         return {
+            "robot warnings": self._robot_remarks,
             "commands accepted": str(counts["accepted"]),
             "answers published": str(counts["published"]),
             "commands rejected": str(counts["rejected"]),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import warnings
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 from typing import Any
@@ -13,6 +14,8 @@ import ctr_pvs
 from ctr_pvs import Backbone
 from ctr_pvs import Loads
 from ctr_pvs import Pose
+from ctr_pvs import Robot
+from ctr_pvs import RobotWarning
 from ctr_pvs import Status
 from ctr_pvs.errors import FieldError
 
@@ -21,6 +24,16 @@ if TYPE_CHECKING:
     from ctr_pvs import EquilibriumSolver
 
 BAD_INPUT = "bad_input"
+
+
+def robot_of(file: str) -> Robot:
+    """The robot of a file. What looks wrong in it is told by the node, once, and not by each of its processes.
+
+    Raises RobotFileError.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RobotWarning)
+        return ctr_pvs.load_robot(file)
 
 
 @dataclass(frozen=True)
@@ -35,7 +48,7 @@ class SolverOptions:
     def new_solver(self) -> EquilibriumSolver:
         """Raises RobotFileError, where that has not been found right before."""
         return ctr_pvs.EquilibriumSolver(
-            ctr_pvs.load_robot(self.robot_file),
+            robot_of(self.robot_file),
             tolerance=self.tolerance,
             fidelity=self.fidelity,
             force_model=self.force_model,

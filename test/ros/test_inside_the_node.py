@@ -2,6 +2,7 @@
 does not end it, a signal is not outlived by a solve, and diagnostics wait for their turn."""
 
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,12 +11,14 @@ from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 
 from ctr_pvs import Loads
+from ctr_pvs.robot.plausibility import implausible
 from ctr_pvs_interfaces.msg import EquilibriumStatus
 from ctr_pvs_ros.node import CATCH_UP_PERIOD
 from ctr_pvs_ros.node import EquilibriumNode
 from ctr_pvs_ros.process import share_file
 from ctr_pvs_ros.service.jobs import Job
 from ctr_pvs_ros.service.jobs import do
+from ctr_pvs_ros.service.jobs import robot_of
 
 ROBOT = str(share_file("config", "renda2021.yaml"))
 JOINTS = ["outer_rotation", "outer_translation", "inner_rotation", "inner_translation"]
@@ -128,3 +131,21 @@ def test_diagnostics_go_out_although_an_output_fails(node, monkeypatch):
     time.sleep(2.0 * CATCH_UP_PERIOD)
     node._guarded(node._catch_up)()
     assert told.count == 1
+
+
+def test_a_robot_that_looks_wrong_is_told_of_once_in_the_log_and_for_good_in_diagnostics(graph, tmp_path, capfd):
+    file = tmp_path / "odd.yaml"
+    file.write_text(Path(ROBOT).read_text(encoding="utf-8").replace("[13.8]", "[588]"), encoding="utf-8")
+    overrides = [Parameter("robot_file", value=str(file))]
+    node = EquilibriumNode(namespace="/odd", parameter_overrides=overrides)
+    try:
+        first, second = (node.handler.report.status("node", "robot", 0.0) for _ in range(2))
+    finally:
+        node.destroy_node()
+    (remark,) = implausible(robot_of(str(file)))
+    assert (first.level, first.message) == (DiagnosticStatus.WARN, remark)
+    assert second.level == DiagnosticStatus.OK
+    assert {value.key: value.value for value in second.values}["robot warnings"] == remark
+    logged = [line for line in capfd.readouterr().err.splitlines() if remark in line]
+    assert len(logged) == 1
+    assert "[WARN]" in logged[0]
