@@ -19,13 +19,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ctr_pvs.answer.status import Status
-from ctr_pvs.cli.hints import turn_hints
 from ctr_pvs.cli.loads import declare_loads
 from ctr_pvs.cli.loads import loads_in
 from ctr_pvs.cli.remarks import robot_warnings_told
 from ctr_pvs.cli.remarks import tell
+from ctr_pvs.cli.remarks import turn_hints
 from ctr_pvs.cli.report import answer_as_json
 from ctr_pvs.cli.report import answer_as_text
+from ctr_pvs.cli.robots.convert import declare_convert
+from ctr_pvs.cli.robots.info import declare_info
 from ctr_pvs.cli.stability import declare_stability
 from ctr_pvs.cli.version import declare_version
 from ctr_pvs.cli.words import Parser
@@ -212,6 +214,12 @@ def _parser() -> Parser:
     )
     declare_version(parser)
     subcommands = parser.add_subparsers(metavar="SUBCOMMAND", required=True)
-    for declare in (_declare_solve, _declare_reproduce, declare_stability):
+    for declare in (
+        _declare_solve,
+        _declare_reproduce,
+        declare_stability,
+        declare_convert,
+        declare_info,
+    ):
         declare(subcommands)
     return parser

@@ -1,0 +1,1 @@
+"""Subcommands about robots themselves: what one is (info), and one from another code's file (convert)."""
