@@ -62,8 +62,8 @@ def _segment(segment: Segment, begin: float, end: float) -> dict[str, Any]:
 
 
 def _clearance(outer: Tube, inner: Tube) -> dict[str, Any]:
-    known = outer.inner_diameter is not None and inner.outer_diameter is not None
-    gap = outer.inner_diameter - inner.outer_diameter if known else None  # type: ignore[operator]
+    bore, outside = outer.inner_diameter, inner.outer_diameter
+    gap = None if bore is None or outside is None else bore - outside
     return {"outer": outer.name, "inner": inner.name, "diametral": gap}
 
 
