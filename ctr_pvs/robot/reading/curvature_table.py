@@ -74,7 +74,10 @@ class Samples:
         for _ in range(_STEPS):
             middle = 0.5 * (low + high)
             low, high = (middle, high) if self.pieces(10.0**middle) is None else (low, middle)
-        return float(f"{1.05 * 10.0**high:.1e}")
+        enough = _two_digits(10.0**high)
+        while self.pieces(enough) is None:  # a larger tolerance may take a piece more now and then
+            enough = _two_digits(1.1 * enough)
+        return enough
 
     def _all_pieces(self, tolerance: float) -> Iterator[Piece]:
         begin, last = 0, len(self.s) - 1
@@ -113,6 +116,12 @@ class Samples:
             if _is_good(s, kappa, coefficients, tolerance, within):
                 return Piece(float(s[-1]), tuple(coefficients.tolist()))
         return _chord(s, kappa) if end == begin + 1 else None
+
+
+def _two_digits(tolerance: float) -> float:
+    """Rounded up."""
+    unit = 10.0 ** (np.floor(np.log10(tolerance)) - 1.0)
+    return float(f"{np.ceil(tolerance / unit) * unit:.1e}")
 
 
 def _in_powers(series: ComplexArray, length: float) -> ComplexArray:
