@@ -38,6 +38,16 @@ class FieldError(ValueError):
         return _sentence(self.field, self.limit, shown(self.value), self.remedy)
 
 
+def check_choice(field: str, value: str, choices: tuple[str, ...]) -> None:
+    """Raises ``FieldError`` for a ``value`` that is none of ``choices``."""
+    if value not in choices:
+        raise FieldError(field, value, f"one of {', '.join(choices)}")
+
+
+class TableError(FieldError):
+    """A table of measurements that cannot be read. `field` is the file, or the column and row in it."""
+
+
 class RobotError(FieldError):
     """A robot, tube or segment that cannot exist, from its constructor. `field` is the constructor's argument."""
 

@@ -50,7 +50,8 @@ class Wrench(NamedTuple):
 class Equilibrium:
     """What came of one command.
 
-    alpha, D : (N,) the command [rad], [m].
+    alpha, D : (N,) the command [rad], [m]; command_at_tubes : what of it reaches the tubes, (alpha, D), other than the
+    command where the robot has play.
     status, message : the outcome, in one word and in one line; ``success`` is true for "ok" and "snap".
     tolerance : of the tip [m]; fidelity : model level.
     applied_loads : the external loads that act, None where none does; ``loads`` are those of the actuators.
@@ -77,6 +78,7 @@ class Equilibrium:
         margin: float | None = None,
     ) -> None:
         self._engine, self.alpha, self.D = engine, alpha, D
+        self.command_at_tubes = alpha, D
         self.status, self.message = status, message
         self.tolerance, self.fidelity, self.force_model = engine.tolerance, fidelity, force_model
         self._state, self.iterations, self.snaps = state, iterations, snaps
@@ -151,7 +153,7 @@ class Equilibrium:
 
     def tube_backbone(self, tube: int, n: int) -> Backbone:
         """``n`` >= 2 poses of one tube's material frame from the orifice to its own tip; ``tube`` counts from 0."""
-        end = max(0.0, float(self._engine.robot.tubes[tube].length - self.D[tube]))
+        end = max(0.0, float(self._engine.robot.tubes[tube].length - self.command_at_tubes[1][tube]))
         s = spaced(self._enough(n)) * min(end, self.length)
         return Backbone(s, *self._engine.poses(self.state.vector, s, tube))
 
@@ -164,7 +166,7 @@ class Equilibrium:
     @property
     def length(self) -> float:
         """Arc length [m] from the orifice to the farthest tip."""
-        return self._engine.robot.length_beyond(self.D)
+        return self._engine.robot.length_beyond(self.command_at_tubes[1])
 
     def twist(self, s: Array) -> Array:
         """psi (g, N) [rad] of each tube at arc lengths ``s`` (g,) [m]; NaN past a tube's tip."""
@@ -258,7 +260,9 @@ class Equilibrium:
         near. It says how much less the tips' rotations are held by the bases (Gilbert, Hendrick, Webster, T-RO 2016).
         NaN if no relaxed state was found.
         """
-        return self._engine.relaxed_gain(self.D, RELAXED_DEGREE) / float(np.linalg.det(self._rates[1]))
+        return self._engine.relaxed_gain(self.command_at_tubes[1], RELAXED_DEGREE) / float(
+            np.linalg.det(self._rates[1])
+        )
 
     @cached_property
     def _all_rates(self) -> tuple[Array, Array, Array]:
@@ -272,7 +276,7 @@ class Equilibrium:
     @cached_property
     def _load_rates(self) -> tuple[Array, Array]:
         """Rates of the tip (6, 6) and of torques and forces (2 N, 6) with force and moment on the tip."""
-        loads = with_tip_point(self._engine.robot, self.D, self.state.loads)
+        loads = with_tip_point(self._engine.robot, self.command_at_tubes[1], self.state.loads)
         if len(loads) == len(self.state.loads):
             rates, _, actuation = self._all_rates
         else:  # bending is not free up to the tip

@@ -61,7 +61,7 @@ class FullEquilibrium(Equilibrium):
         return self._poses(s, self.shape.leader)
 
     def tube_backbone(self, tube: int, n: int) -> Backbone:
-        end = max(0.0, float(self._engine.robot.tubes[tube].length - self.D[tube]))
+        end = max(0.0, float(self._engine.robot.tubes[tube].length - self.command_at_tubes[1][tube]))
         return self._poses(np.linspace(0.0, min(end, self.length), self._enough(n)), tube)
 
     def _poses(self, s: Array, tube: int) -> Backbone:

@@ -16,6 +16,9 @@ from ctr_pvs.robot.cross_section import shear_modulus_from_poisson
 from ctr_pvs.robot.cross_section import torsional_from_poisson
 from ctr_pvs.robot.file_table import Table
 from ctr_pvs.robot.plausibility import implausible
+from ctr_pvs.robot.play import NO_PLAY
+from ctr_pvs.robot.play import WIDEST
+from ctr_pvs.robot.play import PlayWidths
 from ctr_pvs.robot.reading.samples import table_pieces
 from ctr_pvs.robot.reading.units import SEGMENT_KEYS
 from ctr_pvs.robot.reading.units import TUBE_KEYS
@@ -74,6 +77,9 @@ def load_robot(path: str | os.PathLike[str]) -> Robot:
         limits:                      # optional, what the actuators can reach
           alpha: {outer: [-3.2, 3.2]}                   # rad
           D: {outer: [0.0, 0.15]}                       # m
+        play:                        # optional, widths of the backlash between actuators and tubes
+          alpha: {outer: 0.05}                          # rad
+          D: {outer: 0.5e-3}                            # m
 
     In place of the moduli, `bending_stiffness` K and `torsional_stiffness` G J [N m^2] may be given; diameters then
     only serve to check that tubes fit, and for weight. `poissons_ratio` nu in place of the torsional stiffness stands
@@ -101,12 +107,13 @@ def load_robot(path: str | os.PathLike[str]) -> Robot:
     if not isinstance(content, dict):
         raise RobotFileError(file, "", content, "a mapping with the keys name and tubes")
     top = Table(file, "", content)
-    top.refuse_other_keys(("name", "tubes", "limits"))
+    top.refuse_other_keys(("name", "tubes", "limits", "play"))
     name = top.require("name", "the robot's name")
     tubes = tuple(_tube(table) for table in top.tables("tubes", "tube"))
     with top.blamed():
         robot = Robot(name, tubes)  # so that limits are read against names known to be good
-        robot = replace(robot, limits=_limits(top.table("limits"), [tube.name for tube in tubes]))
+        names = [tube.name for tube in tubes]
+        robot = replace(robot, limits=_limits(top.table("limits"), names), play=_play(top.table("play"), names))
     for remark in implausible(robot):
         warnings.warn(f"{file}: {remark}", RobotWarning, stacklevel=2)
     return robot
@@ -263,3 +270,13 @@ def _limits(table: Table, names: list[str]) -> Limits:
     table.refuse_other_keys(("alpha", "alpha_deg", "D", "D_mm"))
     alpha = limits_of(table, "alpha", "alpha_deg", "deg", math.pi / 180.0, names)
     return Limits(alpha, limits_of(table, "D", "D_mm", "mm", 1e-3, names))
+
+
+def _play(table: Table, names: list[str]) -> PlayWidths:
+    table.refuse_other_keys(tuple(WIDEST))
+    widths = {}
+    for kind, widest in WIDEST.items():
+        entries = table.table(kind)
+        entries.refuse_other_keys(names, "tube")
+        widths[kind] = tuple(entries.number(name, 0.0, widest) if name in entries else 0.0 for name in names)
+    return PlayWidths(**widths) if any(map(any, widths.values())) else NO_PLAY

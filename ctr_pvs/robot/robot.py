@@ -26,6 +26,8 @@ from ctr_pvs.robot.command import LARGEST_ALPHA
 from ctr_pvs.robot.command import CommandBounds
 from ctr_pvs.robot.command import Range
 from ctr_pvs.robot.cross_section import annulus_area
+from ctr_pvs.robot.play import NO_PLAY
+from ctr_pvs.robot.play import PlayWidths
 
 LENGTH_RANGE = (1e-7, 1e3)  # m, of a segment; the shortest is far above the slack within which boundaries coincide
 DIAMETER_RANGE = (0.0, 10.0)  # m
@@ -169,7 +171,7 @@ class Limits:
 
 @dataclass(frozen=True)
 class Robot:
-    """Concentric tubes, outermost first.
+    """Concentric tubes, outermost first; `limits` of the actuators, and their `play`, none unless given.
 
     Raises:
         RobotError: for tubes that share a name or do not fit into each other, and limits that allow no command.
@@ -178,6 +180,7 @@ class Robot:
     name: str
     tubes: tuple[Tube, ...]
     limits: Limits = Limits()
+    play: PlayWidths = NO_PLAY
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.strip() or not self.name.isprintable():
@@ -186,6 +189,7 @@ class Robot:
         _check_names(self.tubes)
         _check_fit(self.tubes)
         _set(self, "limits", _complete_limits(self.limits, self.tubes))
+        _ = self.play.of(self.n_tubes)  # raises for another number of tubes
         _ = self._bounds  # raises now, not at the first command, when the limits leave no command
 
     @property

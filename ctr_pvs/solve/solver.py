@@ -20,12 +20,14 @@ from ctr_pvs.answer.state import State
 from ctr_pvs.answer.status import NoEquilibriumError
 from ctr_pvs.answer.status import Status
 from ctr_pvs.errors import FieldError
+from ctr_pvs.errors import check_choice
 from ctr_pvs.kernel.walk.step import MORE
 from ctr_pvs.kernel.walk.step import NOT_PROVEN
 from ctr_pvs.kernel.walk.step import OK
 from ctr_pvs.pvs.printed_loads import check_renda2021
 from ctr_pvs.pvs.refine import refine_full
 from ctr_pvs.robot.loads import Loads
+from ctr_pvs.robot.play import Play
 from ctr_pvs.robot.robot import Robot
 from ctr_pvs.solve.batch import SEVERAL
 from ctr_pvs.solve.batch import Batch
@@ -68,8 +70,8 @@ class EquilibriumSolver:
     def __init__(
         self, robot: Robot, tolerance: float = 1e-5, fidelity: str = "auto", force_model: str = "virtual_work"
     ) -> None:
-        _check_option("fidelity", fidelity, FIDELITIES)
-        _check_option("force_model", force_model, FORCE_MODELS)
+        check_choice("fidelity", fidelity, FIDELITIES)
+        check_choice("force_model", force_model, FORCE_MODELS)
         if force_model == "renda2021":
             check_renda2021(robot)
         if not 1e-10 <= tolerance <= 1.0:
@@ -83,6 +85,7 @@ class EquilibriumSolver:
         self._last: State | None = None
         self._acting: Loads | None = None
         self._packer = LoadPacker(robot, fidelity, force_model)
+        self._play = Play(robot.play.of(robot.n_tubes)) if robot.play else None
 
     def follow(
         self, alpha: ArrayLike, D: ArrayLike, budget: float | None = None, *, loads: Loads | None = None
@@ -162,27 +165,26 @@ class EquilibriumSolver:
         """A solver that does not share the warm start, and has none."""
         other = EquilibriumSolver.__new__(EquilibriumSolver)
         other.__dict__.update(self.__dict__)
-        other._last, other._acting = None, None
+        other._last, other._acting, other._play = None, None, None  # commands are those of the tubes
         return other
 
     def reset(self) -> None:
-        """Forget the warm start: the next solve is cold."""
+        """Forget the warm start, and where play has left the tubes: the next solve is cold."""
         self._last = None
+        if self._play is not None:
+            self._play.reset()
 
     def solve(
-        self,
-        alpha: ArrayLike,
-        D: ArrayLike,
-        start: str = "warm",
-        budget: float | None = None,
-        *,
+        self, alpha: ArrayLike, D: ArrayLike, start: str = "warm", budget: float | None = None, *,
         loads: Loads | None = None,
-    ) -> Equilibrium:
+    ) -> Equilibrium:  # fmt: skip
         """The stable equilibrium at base rotations ``alpha`` (N,) [rad] and base positions ``D`` (N,) [m] under
         ``loads``; None is no load, whatever acted before.
 
         start : "warm" follows the straight path from the last good answer, in alpha, D and loads together; "cold", and
             the first solve, the path from the relaxed robot at this D: the rotation, then the loads in proportion.
+            What of the command reaches the tubes depends on the path, too, if the robot has play; other starts find
+            each play in its middle.
             Angles are not wrapped: 280 deg and -80 deg are different histories. "lowest-energy" has no history: of all
             stable equilibria that ``equilibria`` finds, the one of least energy; not under load.
         budget : seconds that following the path may take; past it the status is TIMEOUT.  A command near enough for
@@ -193,14 +195,24 @@ class EquilibriumSolver:
         Raises ``CommandError`` for a command that the robot cannot take, ``LoadError`` for loads that cannot act on it,
         ``FieldError`` for a wrong option; all are ``ValueError``.
         """
-        _check_option("start", start, ("warm", "cold", "lowest-energy"))
+        check_choice("start", start, ("warm", "cold", "lowest-energy"))
         deadline = deadline_of(budget)
         alpha, D = self.robot.check_command(alpha, D)
-        packed = NO_LOADS
+        tubes, packed = (alpha, D), NO_LOADS
+        if self._play is not None:
+            tubes = self.robot.clamp_command(*self._play.between(alpha, D, start == "warm"))[:2]
         if loads is not None:
-            packed = self._packer.pack(D, loads)
+            packed = self._packer.pack(tubes[1], loads)
             loads = loads if len(packed) else None
-        at = Command(alpha, D, loads)
+        answer = self._solve(Command(*tubes, loads), start, packed, deadline)
+        if self._play is not None:
+            if answer.success:
+                self._play.at = np.concatenate(tubes)
+            answer.alpha, answer.D = alpha, D
+        return answer
+
+    def _solve(self, at: Command, start: str, packed: Array, deadline: float) -> Equilibrium:
+        alpha, D, loads = at
         if self._level == "torsionless":
             return self._torsionless(at)
         if start == "lowest-energy":
@@ -233,7 +245,7 @@ class EquilibriumSolver:
         A row that the robot cannot take is told in the batch.  Raises ``CommandError`` for arrays that are no tables of
         real numbers with a column per tube, ``FieldError`` for a wrong option.
         """
-        _check_option("start", start, ("cold",))
+        check_choice("start", start, ("cold",))
         return solve_rows(self, self._engine, alpha, D, tip_force, tip_moment, self._level, progress)
 
     def solve_alone(self, alpha: Array, D: Array, loads: Loads | None) -> Equilibrium:
@@ -288,9 +300,7 @@ class EquilibriumSolver:
             return self._failure(at, Status.NO_STABLE_EQUILIBRIUM, message)
         return self._told(at, State(vector, self.robot.n_tubes), (), 0, "; twist is neglected")
 
-    def _keep(
-        self, at: Command, state: State, snaps: tuple[Snap, ...], iterations: int, note: str
-    ) -> Equilibrium:  # fmt: skip
+    def _keep(self, at: Command, state: State, snaps: tuple[Snap, ...], iterations: int, note: str) -> Equilibrium:
         """The answer of the level that was asked for; a good one is kept as the next warm start."""
         if self._level == "full" and at.loads is None:
             answer = self._full(at, state, snaps, iterations, note)
@@ -301,9 +311,7 @@ class EquilibriumSolver:
             self._last, self._acting = state if state.coupled else None, at.loads
         return answer
 
-    def _full(
-        self, at: Command, state: State, snaps: tuple[Snap, ...], iterations: int, note: str
-    ) -> Equilibrium:  # fmt: skip
+    def _full(self, at: Command, state: State, snaps: tuple[Snap, ...], iterations: int, note: str) -> Equilibrium:
         refined = refine_full(TorsionShape(self._engine, state), self.tolerance)
         if refined is None:
             message = "Newton at the full level does not converge from the torsion equilibrium"
@@ -340,8 +348,3 @@ class EquilibriumSolver:
             self._engine, at.alpha, at.D, status, message, self._level, self.force_model, iterations=iterations,
             loads=at.loads,
         )  # fmt: skip
-
-
-def _check_option(name: str, value: str, choices: tuple[str, ...]) -> None:
-    if value not in choices:
-        raise FieldError(name, value, f"one of {', '.join(choices)}")

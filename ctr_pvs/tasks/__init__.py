@@ -1,0 +1,1 @@
+"""What people do with a robot model as a whole: fit it to measurements, find commands for poses."""
