@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ctr_pvs.answer.status import Status
+from ctr_pvs.cli.calibrate import declare_calibrate
 from ctr_pvs.cli.loads import declare_loads
 from ctr_pvs.cli.loads import loads_in
 from ctr_pvs.cli.remarks import robot_warnings_told
@@ -220,6 +221,7 @@ def _parser() -> Parser:
         declare_stability,
         declare_convert,
         declare_info,
+        declare_calibrate,
     ):
         declare(subcommands)
     return parser

@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Report = Callable[[str], None]
 
+#: Least deviation of a coordinate that is taken from residuals [m].
+LEAST_STD = 1e-9
 #: Residuals beyond this many standard deviations count less than squared.
 ROBUST = 1.5
 #: Median of the length of a vector of three normal numbers.
@@ -29,6 +31,8 @@ MEDIAN_3D = 1.5382
 FIRST_PLAY = 0.1
 #: What a row without an equilibrium counts for [standard deviations], and evaluations of a fit.
 LOST, MOST_EVALUATIONS = 30.0, 60
+#: A fit that brings the deviation of what is left below this share of what it was weighed with is repeated, so often.
+SETTLED, MOST_STAGES = 0.9, 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,20 +130,16 @@ def register(model: TipModel, tips: Tips, values: Array, rows: Mask) -> None:
 def fit(model: TipModel, rows: Mask, position_std: float | None, direction_std: float, report: Report) -> Fitted:
     """The values that the ``rows`` and the priors ask for.
 
-    position_std [m] : of a measured coordinate, what the model leaves out counted; None takes it from the residuals, by
-    fitting twice.  direction_std : of a component of a measured axis.
+    position_std [m] : of a measured coordinate, what the model leaves out counted; where it is more, and for None, that
+    of the residuals counts, which takes a few fits.  direction_std : of a component of a measured axis.
     """
     values = start_values(model)
     problem = Problem(model, rows, 1.0, direction_std, report)
     register(model, problem.tips(values), values, rows)
-    first = problem.median(problem.tips(values), values) / MEDIAN_3D
-    deviations = [position_std] if position_std is not None else [max(first, 1e-9), None]
-    count, result = 0, None
-    for deviation in deviations:
-        if deviation is None:
-            deviation = max(problem.median(problem.tips(values), values) / MEDIAN_3D, 1e-9)
+    low, high = np.array([(p.low, p.high) for p in model.parameters]).T
+    deviation, count, result = _spread(problem, values, position_std), 0, None
+    for _ in range(MOST_STAGES):
         problem = Problem(model, rows, deviation, direction_std, report)
-        low, high = np.array([(p.low, p.high) for p in model.parameters]).T
         scale = [p.scale for p in model.parameters]
         result = least_squares(
             problem.residuals, values, problem.jacobian, (low, high), "trf", x_scale=scale,
@@ -147,10 +147,21 @@ def fit(model: TipModel, rows: Mask, position_std: float | None, direction_std: 
             ftol=1e-6, xtol=1e-6, gtol=1e-8, max_nfev=MOST_EVALUATIONS,
         )  # fmt: skip
         values, count = np.asarray(result.x), count + problem.evaluations
-    assert result is not None and deviation is not None
+        left = _spread(problem, values, position_std)
+        if left > SETTLED * deviation:
+            break
+        deviation = left
+    assert result is not None
     tips = problem.tips(values)
     weak, seen, errors = _told(problem, values)
-    return Fitted(values, errors, tips, deviation, weak, seen, count, bool(result.status > 0))
+    return Fitted(values, errors, tips, problem.std[0], weak, seen, count, bool(result.status > 0))
+
+
+def _spread(problem: Problem, values: Array, given: float | None) -> float:
+    """Deviation [m] to weigh a coordinate with: the one that is ``given``, but no less than that of what is left now,
+    for beyond it a loss that is robust sees outliers only and steps are small."""
+    left = max(problem.median(problem.tips(values), values) / MEDIAN_3D, LEAST_STD)
+    return left if given is None else max(left, given)
 
 
 def _told(problem: Problem, values: Array) -> tuple[Array, Array, Array]:
@@ -158,12 +169,15 @@ def _told(problem: Problem, values: Array) -> tuple[Array, Array, Array]:
     scale = np.array([parameter.scale for parameter in problem.model.parameters])
     P = len(values)
     rates = problem.jacobian(values)[:-P] * scale
-    z = problem.residuals(values)[:-P] ** 2
-    rates *= np.sqrt((1.0 + z / ROBUST**2) ** -0.5)[:, None]
-    _, sizes, right = np.linalg.svd(rates, full_matrices=True) if len(rates) < P else np.linalg.svd(rates, False)
+    off = problem.residuals(values)[:-P]
+    soft = 1.0 + (off / ROBUST) ** 2
+    _, sizes, right = np.linalg.svd(soft[:, None] ** -0.75 * rates, full_matrices=len(rates) < P)
     sizes = np.concatenate([sizes, np.zeros(P - len(sizes))])
-    held = (right.T * (sizes**2)) @ right + np.diag((problem.prior * scale) ** 2)
-    spread = np.linalg.pinv(held, hermitian=True)
+    prior = np.diag((problem.prior * scale) ** 2)
+    # Of an M-estimator: the spread of the slopes between the inverses of the curvature.
+    inverse = np.linalg.pinv((right.T * sizes**2) @ right + prior, hermitian=True)
+    slopes = (off / np.sqrt(soft))[:, None] * rates
+    spread = inverse @ (slopes.T @ slopes + prior) @ inverse
     weak = sizes < 1.0
     return right[weak], 1.0 / np.maximum(sizes[weak], 1e-12), np.sqrt(np.diag(spread)) * scale
 
