@@ -61,6 +61,10 @@ def declare_calibrate(subcommands: argparse._SubParsersAction[Any]) -> None:
         "--direction-std", type=number, default=0.05, metavar="S", help="of a part of a tangent or axis (%(default)g)"
     )
     calibrate.add_argument(
+        "--robust", type=number, default=1.5, metavar="C",
+        help="what is off by more than C deviations counts less than squared; 1000 for plain squares (%(default)g)",
+    )  # fmt: skip
+    calibrate.add_argument(
         "--hold-out", type=whole_number(0, MOST_ROWS), default=50, metavar="ROWS",
         help="hold out every second block of this many rows; 0 holds out none (%(default)s)",
     )  # fmt: skip
@@ -74,9 +78,6 @@ def _calibrate(arguments: argparse.Namespace) -> int:
     robot = load_robot(arguments.robot)
     priors, bounds = (_pairs(f"--{what}", getattr(arguments, what)) for what in ("prior", "bounds"))
     columns = dict(_split("--columns", word) for word in arguments.columns)
-    for option, value in (("--position-std", arguments.position_std), ("--direction-std", arguments.direction_std)):
-        if value is not None and value <= 0.0:
-            raise UsageError(f"{option}: expected a standard deviation above 0, got {value:g}")
 
     # Only here, for they bring the compiler along: see main.
     from ctr_pvs.tasks.calibrate import calibrate
@@ -95,7 +96,8 @@ def _calibrate(arguments: argparse.Namespace) -> int:
     )  # fmt: skip
     found = calibrate(
         robot, data, fit, priors=priors, bounds=bounds, position_std=arguments.position_std,
-        direction_std=arguments.direction_std, history=not arguments.any_order, block=arguments.hold_out or None,
+        direction_std=arguments.direction_std, robust=arguments.robust,
+        history=not arguments.any_order, block=arguments.hold_out or None,
         progress=lambda line: print(line, file=sys.stderr, flush=True),
     )  # fmt: skip
     print(as_json(found) if arguments.json else as_text(found))

@@ -45,6 +45,8 @@ from ctr_pvs.tasks.calibration.tips import Tips
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+#: In standard deviations, see ``calibrate``.
+ROBUST = 1.5
 #: Rows of a block, of which every second one is held out.
 BLOCK = 50
 
@@ -140,6 +142,7 @@ def calibrate(
     bounds: Mapping[str, Sequence[float]] | None = None,
     position_std: float | None = None,
     direction_std: float = 0.05,
+    robust: float = ROBUST,
     history: bool = True,
     block: int | None = BLOCK,
     tolerance: float = 1e-5,
@@ -149,7 +152,8 @@ def calibrate(
 
     fit : names of parameters or groups, see ``calibration.parameters``; priors, bounds : of them, (mean, std) and (low,
         high).  position_std [m] : of a measured coordinate, what the model leaves out counted; None takes it from the
-        residuals.  direction_std : of a component of a measured axis.
+        residuals.  direction_std : of a component of a measured axis.  robust : what is off by more than so many
+        standard deviations counts less than squared; large for plain least squares.
     history : rows are a path in the order of their measurement, which play needs, and branches near snaps; else each
         row is a cold start.  block : of this many rows every second block is held out, None holds none.
     tolerance : of the model's tips [m].  progress : called with a line from time to time.
@@ -158,6 +162,9 @@ def calibrate(
     """
     began, report = time.perf_counter(), progress or (lambda line: None)
     parameters = chosen(robot, fit, priors, bounds)
+    for name, value in (("position_std", position_std), ("direction_std", direction_std), ("robust", robust)):
+        if value is not None and not value > 0.0:
+            raise FieldError(name, value, "a number above 0")
     if data.alpha.shape[1] != robot.n_tubes:
         raise TableError("alpha", data.alpha.shape, f"a column for each of the {robot.n_tubes} tubes")
     if any(parameter.kind.startswith("play") for parameter in parameters) and not history:
@@ -169,7 +176,7 @@ def calibrate(
     off_before, before = _before(robot, parameters, data, held, history, tolerance)
     report(f"before: median {1e3 * before.fitted.median:.3f} mm over {before.fitted.rows} rows")
     model = TipModel(robot, parameters, data, history, tolerance)
-    fitted = fit_rows(model, ~held, position_std, direction_std, report)
+    fitted = fit_rows(model, ~held, position_std, direction_std, robust, report)
     off, after = _errors(model, fitted.tips, fitted.values, held)
     R, t, sensor = model.placed(fitted.values)
     return Calibration(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -40,7 +42,7 @@ def test_it_knows_no_time_only_order():
     rng = np.random.default_rng(3)
     coarse = rng.normal(size=(30, 1)).cumsum(axis=0)
     fine = [coarse[0] * 1.0]
-    for a, b in zip(coarse[:-1], coarse[1:], strict=True):
+    for a, b in pairwise(coarse):
         fine += [a + (b - a) * t for t in np.linspace(0.0, 1.0, rng.integers(2, 9))]
     coarse_out, fine_out = run([0.7], coarse), run([0.7], fine)
     assert fine_out[-1] == pytest.approx(coarse_out[-1])

@@ -21,10 +21,10 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Report = Callable[[str], None]
 
+#: A fit ends where a step changes the sum of squares, or the values, by less than this share.
+FINE = 1e-5
 #: Least deviation of a coordinate that is taken from residuals [m].
 LEAST_STD = 1e-9
-#: Residuals beyond this many standard deviations count less than squared.
-ROBUST = 1.5
 #: Median of the length of a vector of three normal numbers.
 MEDIAN_3D = 1.5382
 #: Where play begins, in units of its scale: at zero it could not shrink.
@@ -59,7 +59,10 @@ class Problem:
     Priors are residuals too, which no loss makes smaller.
     """
 
-    def __init__(self, model: TipModel, rows: Mask, position_std: float, direction_std: float, report: Report) -> None:
+    def __init__(
+        self, model: TipModel, rows: Mask, position_std: float, direction_std: float, robust: float, report: Report
+    ) -> None:
+        self.robust = robust
         self.model, self.rows, self.report = model, rows, report
         a = model.data.n_axes
         self.std = np.concatenate([np.full(3, position_std), np.full(3 * a, direction_std)])
@@ -96,7 +99,7 @@ class Problem:
     def loss(self, z: Array) -> Array:
         """(3, m) soft L1 and its derivatives for the squares of the rows' residuals; the priors' as they are."""
         out = np.stack([z, np.ones_like(z), np.zeros_like(z)])
-        data, c = slice(0, len(z) - len(self.mean)), ROBUST**2
+        data, c = slice(0, len(z) - len(self.mean)), self.robust**2
         t = 1.0 + z[data] / c
         out[0, data], out[1, data], out[2, data] = 2.0 * c * (np.sqrt(t) - 1.0), t**-0.5, -0.5 / c * t**-1.5
         return out
@@ -127,24 +130,27 @@ def register(model: TipModel, tips: Tips, values: Array, rows: Mask) -> None:
     model.frame = Frame(*best_registration(told[known], model.data.position[known]))
 
 
-def fit(model: TipModel, rows: Mask, position_std: float | None, direction_std: float, report: Report) -> Fitted:
+def fit(
+    model: TipModel, rows: Mask, position_std: float | None, direction_std: float, robust: float, report: Report
+) -> Fitted:
     """The values that the ``rows`` and the priors ask for.
 
     position_std [m] : of a measured coordinate, what the model leaves out counted; where it is more, and for None, that
     of the residuals counts, which takes a few fits.  direction_std : of a component of a measured axis.
+    robust : residuals beyond so many deviations count less than squared.
     """
     values = start_values(model)
-    problem = Problem(model, rows, 1.0, direction_std, report)
+    problem = Problem(model, rows, 1.0, direction_std, robust, report)
     register(model, problem.tips(values), values, rows)
     low, high = np.array([(p.low, p.high) for p in model.parameters]).T
     deviation, count, result = _spread(problem, values, position_std), 0, None
     for _ in range(MOST_STAGES):
-        problem = Problem(model, rows, deviation, direction_std, report)
+        problem = Problem(model, rows, deviation, direction_std, robust, report)
         scale = [p.scale for p in model.parameters]
         result = least_squares(
             problem.residuals, values, problem.jacobian, (low, high), "trf", x_scale=scale,
             loss=problem.loss,  # type: ignore[arg-type] # scipy's stubs want a class
-            ftol=1e-6, xtol=1e-6, gtol=1e-8, max_nfev=MOST_EVALUATIONS,
+            ftol=FINE, xtol=FINE, gtol=1e-8, max_nfev=MOST_EVALUATIONS,
         )  # fmt: skip
         values, count = np.asarray(result.x), count + problem.evaluations
         left = _spread(problem, values, position_std)
@@ -170,7 +176,7 @@ def _told(problem: Problem, values: Array) -> tuple[Array, Array, Array]:
     P = len(values)
     rates = problem.jacobian(values)[:-P] * scale
     off = problem.residuals(values)[:-P]
-    soft = 1.0 + (off / ROBUST) ** 2
+    soft = 1.0 + (off / problem.robust) ** 2
     _, sizes, right = np.linalg.svd(soft[:, None] ** -0.75 * rates, full_matrices=len(rates) < P)
     sizes = np.concatenate([sizes, np.zeros(P - len(sizes))])
     prior = np.diag((problem.prior * scale) ** 2)

@@ -17,6 +17,7 @@ of a segment, what jumps there counts as a point: the density of G, for torsion 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,11 +51,25 @@ class TubeRates:
     length: tuple[Array, ...]
 
 
+@lru_cache(maxsize=128)
+def _polynomials(degree: int, nodes: int) -> tuple[Array, Array]:
+    """``legendre`` at the Gauss points; read-only, as every caller gets the same."""
+    values, integrals = legendre(degree, gauss_legendre(nodes).x)
+    values.flags.writeable = integrals.flags.writeable = False
+    return values, integrals
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """(g, 3); numpy's own takes ten times as long for so few."""
+    (ax, ay, az), (bx, by, bz) = a.T, b.T
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
+
+
 class _Points:
     """Places along the backbone, each in a section: fields and frames there.
 
-    s (g,) [m]; section (g,); torque (g, N) of twist [N m]; K, GJ (g, N) [N m^2]; slope (g, N), derivative of the
-    pre-curvature [1/m^2]; turned (g, N) exp(i psi); b, Z, S as above; turn (2, g, 6) : what a unit of curvature along
+    s (g,) [m]; section (g,); torque (g, N) of twist [N m]; K, GJ (g, N) [N m^2]; turned (g, N) exp(i psi); b, Z, S as
+    above; turn (2, g, 6) : what a unit of curvature along
     the Bishop frame's y and z does to the tip.
     """
 
@@ -65,17 +80,23 @@ class _Points:
         position, orientation = engine.poses(state.vector, s)
         psi, self.torque = engine.angles(state.vector, s)
         self.K, self.GJ = materials.bending[section], materials.torsional[section]
-        kappa, self.slope = np.zeros((2, len(s), engine.robot.n_tubes), dtype=complex)
-        for m in np.unique(section).tolist():
+        kappa = np.zeros((len(s), engine.robot.n_tubes), dtype=complex)
+        for m in range(materials.domain.n_sections):
             here = section == m
             kappa[here] = materials.pre_curvature(m, s[here])
-            self.slope[here] = materials.pre_curvature_rate(m, s[here])
         self.turned = np.exp(1j * psi)
         self.b = self.K * kappa * self.turned
         self.Z, self.S = self.b.sum(axis=1), self.K.sum(axis=1)
         arm = state.tip[:3] - position
         y, z = _bishop(orientation, psi[:, materials.domain.leader])
-        self.turn = np.stack([np.hstack([np.cross(y, arm), y]), np.hstack([np.cross(z, arm), z])])
+        self.turn = np.stack([np.hstack([_cross(y, arm), y]), np.hstack([_cross(z, arm), z])])
+
+    def slope(self, materials: Materials) -> Complex:
+        """(g, N) derivative of the pre-curvature [1/m^2]."""
+        out = np.zeros_like(self.b)
+        for m in range(materials.domain.n_sections):
+            out[self.section == m] = materials.pre_curvature_rate(m, self.s[self.section == m])
+        return out
 
     def moved_tip(self, curvature: Complex) -> Array:
         """(g, ..., 6) how changes of ``curvature`` (g, ...), per length, move the tip."""
@@ -105,10 +126,11 @@ class _Adjoint:
         self.GJ = materials.torsional[materials.domain.locate(elements[:, :2].mean(axis=1))]
         self.root = np.sqrt(materials.guide_compliance)
         self.first = self.N + np.concatenate([[0], np.cumsum([self.N * (d + 1) for d in self.degrees])]).astype(int)
+        self.nodes = np.bincount(element).tolist()
         map_, slope = self._map(points.s, element)
         pull = self._pull(points, weights, map_)
         # The frame that the tip's rotation is told of is a tube's: it turns with that tube's end.
-        end = self._map(elements[-1:, 1], np.array([len(elements) - 1]))[0][0, materials.domain.leader]
+        end = self._map(elements[-1:, 1], np.array([len(elements)]))[0][0, materials.domain.leader]
         pull[:, 3:] += end[:, None] * tangent(state)
         self.unknowns = np.linalg.solve(self._hessian(points, weights, map_), pull)
         self.angle, self.torque = map_ @ self.unknowns, points.GJ[..., None] * (slope @ self.unknowns)
@@ -132,7 +154,10 @@ class _Adjoint:
             columns = self.first[m] + (d + 1) * tubes
             out[np.flatnonzero(element > m)[:, None], tubes, columns] = scale
             here = np.flatnonzero(element == m)
-            values, integrals = legendre(d, (s[here] - start) / h)
+            if not len(here):
+                continue
+            at_nodes = len(here) == self.nodes[m] and len(s) > len(self.nodes)
+            values, integrals = _polynomials(d, len(here)) if at_nodes else legendre(d, (s[here] - start) / h)
             for j in range(self.N):
                 span = slice(int(columns[j]), int(columns[j]) + d + 1)
                 out[here, j, span], slope[here, j, span] = scale[j] * integrals, scale[j] / h * values
@@ -158,8 +183,9 @@ class _Adjoint:
         return map_.reshape(-1, map_.shape[2]).T @ rate.reshape(-1, 6)
 
 
-def tube_rates(shape: TorsionShape) -> TubeRates:
-    """Of the ``shape`` of a stable equilibrium without loads."""
+def tube_rates(shape: TorsionShape, lengths: bool = True) -> TubeRates:
+    """Of the ``shape`` of a stable equilibrium without loads; without ``lengths`` those columns are empty, which takes
+    half the time."""
     engine, state, materials = shape.engine, shape.state, shape.materials
     robot, N = engine.robot, engine.robot.n_tubes
     if not materials.domain.n_sections:
@@ -183,7 +209,7 @@ def tube_rates(shape: TorsionShape) -> TubeRates:
         np.einsum("g,gnc->cn", weights, scaled + stiffened),
         -np.einsum("g,gn,gnc->cn", weights, twisted, adjoint.torque) - (guide[:, None] * adjoint.guide).T,
         np.einsum("g,gnc->cn", weights, scaled),
-        _lengths(engine, state, materials, points, weights, adjoint),
+        _lengths(engine, state, materials, points, weights, adjoint) if lengths else (),
     )
 
 
@@ -212,7 +238,9 @@ def _lengths(
     """Rates with the length of each segment: what lies beyond in the tube moves on, what lies in the guide changes."""
     robot, domain, D = engine.robot, materials.domain, state.D
     ends, torsion = _moved_ends(engine, state, materials, adjoint)
-    slid = np.einsum("g,gnc->gnc", weights, _scaled(points, adjoint.angle, -points.K * points.slope * points.turned))
+    slid = np.einsum(
+        "g,gnc->gnc", weights, _scaled(points, adjoint.angle, -points.K * points.slope(materials) * points.turned)
+    )
     guide = engine.angles(state.vector, np.array([-1.0]))[1][0][:, None] * adjoint.guide  # (N, 6)
     out = []
     for j, tube in enumerate(robot.tubes):

@@ -150,7 +150,7 @@ class TipModel:
             return
         shape = answer.shape
         wanted = self.loads is None and bool(self.columns(*OF_TUBES))
-        tubes = tube_rates(shape) if wanted and isinstance(shape, TorsionShape) else None
+        tubes = tube_rates(shape, bool(self.columns("length"))) if wanted and isinstance(shape, TorsionShape) else None
         joints = np.where(np.concatenate(answer.command_at_tubes) == tips.joints[row], joints, 0.0)  # clamped ones rest
         for index, parameter in enumerate(self.parameters):
             kind, j = parameter.kind, parameter.tube
@@ -221,14 +221,9 @@ def played(commands: Array, widths: Array) -> tuple[Array, Array]:
     play, out, rates = Play(widths), np.empty_like(commands), np.zeros_like(commands)
     for row, command in enumerate(commands):
         out[row] = play.update(command)
-        off = out[row] - command
-        before = rates[row - 1] if row else np.zeros(len(widths))
-        pushed = (np.abs(off) >= play.half) & (off != 0.0)
-        # A closed slot opens to where the joint came from.
-        came = np.sign(commands[row - 1] - command) if row else np.zeros(len(widths))
-        rates[row] = np.where(
-            pushed, 0.5 * np.sign(off), np.where((play.half == 0.0) & (came != 0), 0.5 * came, before)
-        )
+        if row:  # a closed slot opens to where the joint came from
+            side = 0.5 * np.sign(out[row - 1] - command)
+            rates[row] = np.where(out[row] != out[row - 1], side, rates[row - 1])
     return out, rates
 
 
