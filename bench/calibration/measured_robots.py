@@ -93,13 +93,18 @@ HEAD = ["what is fitted", "held out: median [mm]", "90 %", "largest", "Poisson's
 
 def three_tube_table(file: Path) -> str:
     robot, data = three_tubes(), three_tube_tips(file)
+    squares = {"bounds": PHYSICAL, "robust": 1e3}
     fits = {
         "registration": (("registration",), {}),
-        "tubes and joints": ((*TUBES, *JOINTS), {"bounds": PHYSICAL}),
-        "tubes and joints, any Poisson's ratio": ((*TUBES, *JOINTS), {"bounds": FREE, "priors": NO_PRIOR}),
-        "tubes, joints and play": ((*TUBES, *JOINTS, *PLAY), {"bounds": PHYSICAL}),
-        "tubes, joints and play, plain squares": ((*TUBES, *JOINTS, *PLAY), {"bounds": PHYSICAL, "robust": 1e3}),
-    }
+        "tubes": ((*TUBES, "registration"), squares),
+        "tubes and joints": ((*TUBES, *JOINTS), squares),
+        "tubes and rotations, any Poisson's ratio": (
+            (*TUBES, "alpha", "registration"), {"bounds": FREE, "priors": NO_PRIOR, "robust": 1e3}
+        ),
+        "tubes, translations and play": ((*TUBES, "D", "registration", *PLAY), squares),
+        "tubes, joints and play": ((*TUBES, *JOINTS, *PLAY), squares),
+        "tubes, joints and play, robust": ((*TUBES, *JOINTS, *PLAY), {"bounds": PHYSICAL}),
+    }  # fmt: skip
     return _table({name: calibrate(robot, data, fit, **options) for name, (fit, options) in fits.items()})
 
 
