@@ -36,20 +36,30 @@ if TYPE_CHECKING:
     from ctr_pvs.answer.equilibrium import Equilibrium
     from ctr_pvs.solve.batch import Batch
     from ctr_pvs.solve.equilibria import equilibria
-    from ctr_pvs.solve.solver import EquilibriumSolver
+    from ctr_pvs.tasks.inverse import InverseResult
+    from ctr_pvs.tasks.inverse import InverseStatus
+    from ctr_pvs.tasks.motion import Deployment
+    from ctr_pvs.tasks.motion import Motion
+    from ctr_pvs.tasks.motion import Rates
+    from ctr_pvs.tasks.solver import EquilibriumSolver
 
 __all__ = [
     "Backbone",
     "Batch",
     "CommandError",
+    "Deployment",
     "Equilibrium",
     "EquilibriumSolver",
+    "InverseResult",
+    "InverseStatus",
     "Limits",
     "LoadError",
     "Loads",
+    "Motion",
     "NoEquilibriumError",
     "PointForce",
     "Pose",
+    "Rates",
     "Robot",
     "RobotError",
     "RobotFileError",
@@ -63,8 +73,13 @@ __all__ = [
 
 _LATER = {
     "Batch": "ctr_pvs.solve.batch",
+    "Deployment": "ctr_pvs.tasks.motion",
     "Equilibrium": "ctr_pvs.answer.equilibrium",
-    "EquilibriumSolver": "ctr_pvs.solve.solver",
+    "EquilibriumSolver": "ctr_pvs.tasks.solver",
+    "InverseResult": "ctr_pvs.tasks.inverse",
+    "InverseStatus": "ctr_pvs.tasks.inverse",
+    "Motion": "ctr_pvs.tasks.motion",
+    "Rates": "ctr_pvs.tasks.motion",
     "equilibria": "ctr_pvs.solve.equilibria",
 }
 

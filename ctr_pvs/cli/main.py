@@ -20,8 +20,10 @@ from typing import TYPE_CHECKING
 
 from ctr_pvs.answer.status import Status
 from ctr_pvs.cli.calibrate import declare_calibrate
+from ctr_pvs.cli.follow import declare_follow
 from ctr_pvs.cli.loads import declare_loads
 from ctr_pvs.cli.loads import loads_in
+from ctr_pvs.cli.reach import declare_reach
 from ctr_pvs.cli.remarks import robot_warnings_told
 from ctr_pvs.cli.remarks import tell
 from ctr_pvs.cli.remarks import turn_hints
@@ -50,7 +52,8 @@ NO_STABLE_EQUILIBRIUM = 3
 NO_ANSWER_IN_TIME_OR_TOLERANCE = 4
 
 EXIT_CODES = (
-    "Exit codes: 0 success, 2 bad input, 3 no stable equilibrium, 4 not converged, tolerance missed or out of time."
+    "Exit codes: 0 success, 2 bad input, 3 no stable equilibrium, 4 not converged, tolerance missed or out of time, "
+    "5 a target that was not reached."
 )
 
 MOST_POSES = 100_000
@@ -139,7 +142,7 @@ def _solve(arguments: argparse.Namespace) -> int:
     if loads is not None:
         check_loads(robot, D, loads)
 
-    from ctr_pvs.solve.solver import EquilibriumSolver
+    from ctr_pvs.tasks.solver import EquilibriumSolver
 
     solver = EquilibriumSolver(
         robot,
@@ -222,6 +225,8 @@ def _parser() -> Parser:
         declare_convert,
         declare_info,
         declare_calibrate,
+        declare_reach,
+        declare_follow,
     ):
         declare(subcommands)
     return parser

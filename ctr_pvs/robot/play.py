@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -85,9 +86,11 @@ class Play:
         self.at = self.after(command)
         return self.at.copy()
 
-    def reset(self) -> None:
-        """Forget where the far sides are."""
-        self.at = None
+    def moved(self, at: Array | None) -> Play:
+        """The same with its far sides at ``at`` (J,), or forgotten; who shares this one keeps it as it is."""
+        other = copy(self)
+        other.at = at
+        return other
 
     def between(self, alpha: Array, D: Array, remembered: bool) -> tuple[Array, Array]:
         """What of a command alpha, D (N,) reaches the tubes; unless what came before is ``remembered``, all of it."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -90,12 +91,9 @@ class EquilibriumSolver:
     def follow(
         self, alpha: ArrayLike, D: ArrayLike, budget: float | None = None, *, loads: Loads | None = None
     ) -> Equilibrium:
-        """Go from the last good answer to (alpha, D) and ``loads`` along the straight path, through folds: ``solve``
-        with a warm start.
-
-        Rotation and sliding may come together.  Where the branch ends the robot snaps: the status is SNAP, and
-        ``answer.snaps`` tells for each one the fraction of the path, alpha and D there, the states before and after,
-        and the energy released.
+        """``solve`` with a warm start: the straight path from the last good answer, in all at once, through folds.
+        Where the branch ends the robot snaps: the status is SNAP, and ``answer.snaps`` tells for each one the fraction of the
+        path, alpha and D there, the states before and after, and the energy released.
         """
         return self.solve(alpha, D, "warm", budget, loads=loads)
 
@@ -152,7 +150,7 @@ class EquilibriumSolver:
         Raises ``FieldError`` for measurements that are none, and as ``solve`` does.
         """
         told = measured(self.robot.n_tubes, torque, force, tip_position, torque_std, force_std, position_std)
-        other = self._copy()
+        other = self.fork()
         known = loads or Loads()
 
         def solve(tip: Array) -> Equilibrium:
@@ -161,18 +159,20 @@ class EquilibriumSolver:
 
         return sense(solve, told, np.array(guess, dtype=np.float64), largest_std)
 
-    def _copy(self) -> EquilibriumSolver:
-        """A solver that does not share the warm start, and has none."""
-        other = EquilibriumSolver.__new__(EquilibriumSolver)
+    def fork(self, answer: Equilibrium | None = None) -> Self:
+        """A solver that does not share the warm start: its own is ``answer``, one of this robot's, or none."""
+        other = type(self).__new__(type(self))
         other.__dict__.update(self.__dict__)
         other._last, other._acting, other._play = None, None, None  # commands are those of the tubes
+        if answer is not None and answer.state.coupled:
+            other._last, other._acting = answer.state, answer.applied_loads
         return other
 
     def reset(self) -> None:
         """Forget the warm start, and where play has left the tubes: the next solve is cold."""
         self._last = None
         if self._play is not None:
-            self._play.reset()
+            self._play = self._play.moved(None)
 
     def solve(
         self, alpha: ArrayLike, D: ArrayLike, start: str = "warm", budget: float | None = None, *,
@@ -207,7 +207,7 @@ class EquilibriumSolver:
         answer = self._solve(Command(*tubes, loads), start, packed, deadline)
         if self._play is not None:
             if answer.success:
-                self._play.at = np.concatenate(tubes)
+                self._play = self._play.moved(np.concatenate(tubes))
             answer.alpha, answer.D = alpha, D
         return answer
 
@@ -250,7 +250,7 @@ class EquilibriumSolver:
 
     def solve_alone(self, alpha: Array, D: Array, loads: Loads | None) -> Equilibrium:
         """A cold start that leaves the warm start as it is; for threads of a batch."""
-        return self._copy().solve(alpha, D, start="cold", loads=loads)
+        return self.fork().solve(alpha, D, start="cold", loads=loads)
 
     def _cold(self, at: Command, packed: Array, deadline: float) -> Equilibrium:
         """The path from the relaxed robot at this D, where one has to be walked, then the loads."""

@@ -1,1 +1,1 @@
-"""What people do with a robot model as a whole: fit it to measurements, find commands for poses."""
+"""What users do with many equilibria: fit a robot to measurements, find the command for a tip, lead it along a path."""

@@ -63,8 +63,8 @@ def test_what_might_come_is_not_remembered():
     play.update([0.0])
     assert play.after([2.0]) == pytest.approx([1.5])
     assert play.at == pytest.approx([0.0])
-    play.reset()
-    assert play.update([2.0]) == pytest.approx([2.0])
+    assert play.moved(None).update([2.0]) == pytest.approx([2.0])
+    assert play.at == pytest.approx([0.0])
 
 
 def test_a_robot_file_may_have_it(tmp_path):

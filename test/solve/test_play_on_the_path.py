@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import replace
 
 import numpy as np
@@ -27,6 +28,14 @@ def test_a_turn_back_has_to_cross_the_slot(loose, seed_robot):
     back = loose.solve([0.0, 0.35], D)  # within the slot: nothing moves
     assert back.tip.position == pytest.approx(answer.tip.position, abs=1e-9)
     assert loose.solve([0.0, 0.0], D).command_at_tubes[0] == pytest.approx([0.0, 0.1])
+
+
+def test_a_copy_has_a_history_of_its_own(loose):
+    """As of the node's stream, whose withheld answers leave no trace."""
+    loose.solve([0.0, 0.0], D)
+    tried = copy.copy(loose)
+    assert tried.solve([0.0, 0.5], D).command_at_tubes[0] == pytest.approx([0.0, 0.4])
+    assert loose.solve([0.0, 0.05], D).command_at_tubes[0] == pytest.approx([0.0, 0.0])
 
 
 def test_sliding_and_lengths_are_those_of_the_tubes(loose, seed_robot):

@@ -1,0 +1,1 @@
+"""Inverse kinematics: what is reached, how fast, and how near the rest is come to."""
