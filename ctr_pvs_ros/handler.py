@@ -6,18 +6,26 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+import numpy as np
 from builtin_interfaces.msg import Time
+from geometry_msgs.msg import PoseStamped
 from geometry_msgs.msg import WrenchStamped
+from numpy.typing import NDArray
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
 from ctr_pvs import Loads
+from ctr_pvs import Robot
 from ctr_pvs_interfaces.msg import EquilibriumStatus
 from ctr_pvs_ros.inputs.commands import Command
 from ctr_pvs_ros.inputs.commands import CommandReader
 from ctr_pvs_ros.inputs.commands import Leniency
 from ctr_pvs_ros.inputs.commands import RejectedCommand
 from ctr_pvs_ros.inputs.external_load import ExternalLoad
+from ctr_pvs_ros.inputs.poses import PoseReason
+from ctr_pvs_ros.inputs.poses import RejectedPose
+from ctr_pvs_ros.inputs.poses import TipGoal
+from ctr_pvs_ros.inputs.poses import read_pose
 from ctr_pvs_ros.inputs.wrenches import RejectedWrench
 from ctr_pvs_ros.inputs.wrenches import WrenchReader
 from ctr_pvs_ros.outputs import messages
@@ -30,12 +38,17 @@ from ctr_pvs_ros.parameters import Settings
 from ctr_pvs_ros.stream import Answer
 from ctr_pvs_ros.stream import Policy
 from ctr_pvs_ros.stream import Stream
+from ctr_pvs_ros.tip_servo import TipServo
 
 if TYPE_CHECKING:
+    from ctr_pvs import Equilibrium
     from ctr_pvs import EquilibriumSolver
 
+NAN = float("nan")
 LOG_PERIOD = 2.0  # s; at most one line of a kind in this time
-COMMAND, WRENCH = EquilibriumStatus.COMMAND, EquilibriumStatus.WRENCH
+COMMAND, WRENCH, POSE = EquilibriumStatus.COMMAND, EquilibriumStatus.WRENCH, EquilibriumStatus.POSE
+#: The ways of poses never snap: who asks for a place of the tip asks for no leap.
+HOLD = "hold"
 
 
 class Handler:
@@ -64,18 +77,21 @@ class Handler:
         self._wrench_reader = WrenchReader(settings.frame_id, settings.tip_frame_id)
         self._load: ExternalLoad[Time] = ExternalLoad()
         self._outputs = outputs
+        self._tip_servo: tuple[tuple[Robot, float, float], TipServo] | None = None
         self.report = Report(self._load if settings.use_external_wrench else None)
 
     def release(self) -> None:
         """Accept commands again after a snap under on_snap = stop."""
         self._stream.release()
 
-    def answer(self, joints: JointState | None, wrench: WrenchStamped | None) -> None:
+    def answer(self, command: JointState | PoseStamped | None, wrench: WrenchStamped | None) -> None:
         """Solve once for all that came. The answer has the command's stamp; the wrench's, where it alone is good."""
         if wrench is not None:
             self._on_wrench(wrench)
-        if joints is not None:
-            self._on_command(joints)
+        if isinstance(command, PoseStamped):
+            self._on_pose(command)
+        elif command is not None:
+            self._on_command(command)
         load, last = self._load, self._stream.last
         # A load is kept for the command to come while there is no answer yet, or commands are refused after a snap.
         if load.unanswered is not None and last is not None and not self._stream.stopped:
@@ -116,11 +132,40 @@ class Handler:
         try:
             self._follow(self.reader.read(message.name, message.position, leniency, self._stream.last), stamp)
         except RejectedCommand as rejection:
-            self.report.rejected(rejection)
-            self._outputs.tell(outcomes.refused(stamp, COMMAND, rejection))
-            self._log.warning(
-                f"command rejected: {rejection.reason.value}: {rejection}", throttle_duration_sec=LOG_PERIOD
-            )
+            self._refuse(stamp, COMMAND, rejection)
+
+    def _on_pose(self, message: PoseStamped) -> None:
+        """One step of the tip towards a pose, set out from the last answer."""
+        stamp, age = self._stamp_for(message.header.stamp)
+        self.report.received(age)
+        settings, last = self.settings, self._stream.answer
+        try:
+            numbers = messages.numbers_of(message.pose)
+            goal = read_pose(message.header.frame_id, *numbers, settings.frame_id, settings.servo_cp_goal)
+            if last is None:
+                raise RejectedPose(PoseReason.NO_START, "the tip is nowhere yet: expected a command on servo_jp first")
+            command = Command(*self._servo().step(last, goal, self._try_out))
+            self._solve(command, stamp, self._trigger(POSE), goal=goal)
+        except (RejectedCommand, RejectedPose) as rejection:
+            self._refuse(stamp, POSE, rejection)
+        else:
+            self.report.accepted(command)
+
+    def _try_out(self, alpha: NDArray[np.float64], D: NDArray[np.float64]) -> Equilibrium:
+        return self._stream.try_out(Command(alpha, D), self.settings.compute_budget, self._load.loads)
+
+    def _servo(self) -> TipServo:
+        """For the limits and rates that hold."""
+        of = (self.reader.robot, self.settings.rotation_rate, self.settings.translation_rate)
+        if self._tip_servo is None or self._tip_servo[0] != of:
+            self._tip_servo = of, TipServo(*of)
+        return self._tip_servo[1]
+
+    def _refuse(self, stamp: Time, trigger: int, rejection: RejectedCommand | RejectedPose) -> None:
+        self.report.rejected(rejection)
+        self._outputs.tell(outcomes.refused(stamp, trigger, rejection))
+        kind = "pose" if trigger == POSE else "command"
+        self._log.warning(f"{kind} rejected: {rejection.reason.value}: {rejection}", throttle_duration_sec=LOG_PERIOD)
 
     def _stamp_for(self, stamp: Time) -> tuple[Time, float | None]:
         """The stamp of all that answers a message, and the message's age at receipt [s]; None: it had a zero stamp."""
@@ -132,17 +177,21 @@ class Handler:
 
     def _follow(self, command: Command, stamp: Time) -> None:
         """Answer a new command."""
-        trigger = COMMAND if self._load.unanswered is None else COMMAND | WRENCH
         hint = "; ".join(command.notes + command.hints)
-        self._solve(command, stamp, trigger, hint)
+        self._solve(command, stamp, self._trigger(COMMAND), hint)
         self.report.accepted(command)
         if hint:
             self._log.warning(f"command accepted, but {hint}", throttle_duration_sec=LOG_PERIOD)
 
-    def _solve(self, command: Command, stamp: Time, trigger: int, hint: str = "") -> None:
+    def _trigger(self, kind: int) -> int:
+        """A wrench that waits is answered along."""
+        return kind if self._load.unanswered is None else kind | WRENCH
+
+    def _solve(self, command: Command, stamp: Time, trigger: int, hint: str = "", goal: TipGoal | None = None) -> None:
         """Solve under the load that acts, and let the answer go where it may."""
         settings = self.settings
-        policy = Policy(settings.on_snap, settings.margin_warn, settings.margin_stop)
+        on_snap = HOLD if goal is not None and settings.on_snap == "follow" else settings.on_snap
+        policy = Policy(on_snap, settings.margin_warn, settings.margin_stop)
         loads = self._load.loads
         with self._failures_told(stamp, trigger):
             answer = self._interruptible(command, policy, loads)
@@ -150,7 +199,8 @@ class Handler:
             if answer.verdict.publish:
                 stamped = stamp_bytes(stamp.sec, stamp.nanosec)
                 self._outputs.publish(Sent(answer.equilibrium, stamped, settings.backbone_poses))
-        self._outputs.tell(outcomes.solved(stamp, trigger, answer, loads, hint))
+        off = NAN if goal is None or not answer.equilibrium.success else goal.distance(answer.equilibrium)
+        self._outputs.tell(outcomes.solved(stamp, trigger, answer, loads, hint, off))
         self.report.answered(answer)
         if not answer.verdict.publish:
             self._log.error(answer.verdict.remark, throttle_duration_sec=LOG_PERIOD)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseStamped
 from geometry_msgs.msg import WrenchStamped
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock
@@ -168,8 +169,8 @@ class EquilibriumNode(Node):
 
         return guarded
 
-    def _on_messages(self, joints: JointState | None, wrench: WrenchStamped | None) -> None:
-        self.handler.answer(joints, wrench)
+    def _on_messages(self, command: JointState | PoseStamped | None, wrench: WrenchStamped | None) -> None:
+        self.handler.answer(command, wrench)
         # Diagnostics take longer than an answer. Begun here, they cost a command only if they last until the second
         # one from now comes, which would overtake the first.
         if self._diagnostics_due is not None:

@@ -42,6 +42,9 @@ class Settings:
     rotation_limits: tuple[float, ...]
     translation_limits: tuple[float, ...]
     on_snap: str
+    servo_cp_goal: str
+    rotation_rate: float
+    translation_rate: float
     command_timeout: float
     wrench_timeout: float
     compute_budget: float
@@ -132,6 +135,17 @@ PARAMETERS: dict[str, ParameterRule] = {
         "When a command makes the tubes snap: follow publishes the landing, hold keeps the answer before the snap, "
         "stop holds and refuses all further commands until this parameter is set again.",
         choices=("follow", "hold", "stop"),
+    ),
+    "servo_cp_goal": ParameterRule(
+        "position",
+        "What of a pose on servo_cp the tip should meet; tangent: and its x axis, orientation: and all of it.",
+        choices=("position", "tangent", "orientation"),
+    ),
+    "rotation_rate": ParameterRule(
+        0.0, "Most that poses on servo_cp turn a tube [rad/s]; 0: no limit.", bounds=(0.0, 1000.0)
+    ),
+    "translation_rate": ParameterRule(
+        0.0, "Most that poses on servo_cp slide a tube [m/s]; 0: no limit.", bounds=(0.0, 100.0)
     ),
     "command_timeout": ParameterRule(
         0.0, "Diagnostics say stale when no command came for this long [s]; 0: never.", bounds=(0.0, 86400.0)

@@ -82,6 +82,11 @@ class Stream:
         self.last: Command | None = None  # the command behind the last answer that went out
 
     @property
+    def answer(self) -> Equilibrium | None:
+        """The last one that went out."""
+        return self._published
+
+    @property
     def orientation(self) -> NDArray[np.float64] | None:
         """Of the tip of the last answer that went out, unit quaternion (4,) xyzw; None: there is none."""
         return None if self._published is None else self._published.tip.orientation
@@ -89,6 +94,10 @@ class Stream:
     def release(self) -> None:
         """Accept commands again after a snap under on_snap = stop."""
         self.stopped = False
+
+    def try_out(self, command: Command, budget: float, loads: Loads | None = None) -> Equilibrium:
+        """What `follow` would find; nothing goes out and nothing changes."""
+        return copy.copy(self._solver).solve(command.alpha, command.D, start="warm", budget=budget, loads=loads)
 
     def follow(self, command: Command, policy: Policy, budget: float, loads: Loads | None = None) -> Answer:
         """Solve for a command under `loads` from the last answer that went out, within `budget` [s].

@@ -25,6 +25,7 @@ PARTS = (
     "process",
     "inputs",
     "stream",
+    "tip_servo",
     "outputs",
     "handler",
     "service",
@@ -37,7 +38,15 @@ PARTS = (
     "front",
 )
 #: Hold the decisions; they are tried without ROS.
-WITHOUT_ROS = ("inputs/joints", "inputs/commands", "inputs/wrenches", "inputs/external_load", "stream")
+WITHOUT_ROS = (
+    "inputs/joints",
+    "inputs/commands",
+    "inputs/wrenches",
+    "inputs/external_load",
+    "inputs/poses",
+    "stream",
+    "tip_servo",
+)
 
 
 def modules() -> list[Path]:

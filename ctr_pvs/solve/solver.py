@@ -92,8 +92,8 @@ class EquilibriumSolver:
         self, alpha: ArrayLike, D: ArrayLike, budget: float | None = None, *, loads: Loads | None = None
     ) -> Equilibrium:
         """``solve`` with a warm start: the straight path from the last good answer, in all at once, through folds.
-        Where the branch ends the robot snaps: the status is SNAP, and ``answer.snaps`` tells for each one the fraction of the
-        path, alpha and D there, the states before and after, and the energy released.
+        Where the branch ends the robot snaps: the status is SNAP, and ``answer.snaps`` tells for each one the fraction
+        of the path, alpha and D there, the states before and after, and the energy released.
         """
         return self.solve(alpha, D, "warm", budget, loads=loads)
 

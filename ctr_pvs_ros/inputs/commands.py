@@ -108,6 +108,11 @@ class CommandReader:
         self._robot = replace(robot, limits=Limits(alpha, D)) if rotation_limits or translation_limits else robot
         self._known = frozenset(self.joints.names)
 
+    @property
+    def robot(self) -> Robot:
+        """With the limits that hold."""
+        return self._robot
+
     def is_for_others(self, names: Sequence[str], leniency: Leniency) -> bool:
         """Whether a message is none of this robot's business: one on a shared topic, with joints of others only."""
         return leniency.ignore_unknown_joints and len(names) > 0 and self._known.isdisjoint(names)

@@ -17,6 +17,7 @@ from ctr_pvs import Status
 from ctr_pvs_ros.inputs.commands import Command
 from ctr_pvs_ros.inputs.commands import RejectedCommand
 from ctr_pvs_ros.inputs.external_load import ExternalLoad
+from ctr_pvs_ros.inputs.poses import RejectedPose
 from ctr_pvs_ros.outputs.outcomes import snap_reserve
 from ctr_pvs_ros.stream import Answer
 
@@ -68,7 +69,7 @@ class Report:
         """A message came that is none of this robot's business."""
         self._counts["for_others"] += 1
 
-    def rejected(self, rejection: RejectedCommand) -> None:
+    def rejected(self, rejection: RejectedCommand | RejectedPose) -> None:
         """The command changed nothing."""
         self._counts["rejected"] += 1
         self._reasons[rejection.reason.value] += 1

@@ -40,6 +40,12 @@ def vectors_of(wrench: Wrench) -> tuple[Vector, Vector]:
     return (force.x, force.y, force.z), (moment.x, moment.y, moment.z)
 
 
+def numbers_of(pose: Pose) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Position [m] and quaternion xyzw of a Pose."""
+    p, q = pose.position, pose.orientation
+    return (p.x, p.y, p.z), (q.x, q.y, q.z, q.w)
+
+
 def pose_of(position: NDArray[np.float64], orientation: NDArray[np.float64]) -> Pose:
     """A Pose from position (3,) [m] and unit quaternion (4,) xyzw."""
     x, y, z = position.tolist()

@@ -17,6 +17,7 @@ from ctr_pvs import NoEquilibriumError
 from ctr_pvs import Status
 from ctr_pvs_interfaces.msg import EquilibriumStatus
 from ctr_pvs_ros.inputs.commands import RejectedCommand
+from ctr_pvs_ros.inputs.poses import RejectedPose
 from ctr_pvs_ros.inputs.wrenches import RejectedWrench
 from ctr_pvs_ros.outputs.serialized import STAMP
 from ctr_pvs_ros.outputs.serialized import Form
@@ -38,7 +39,7 @@ class Outcome:
     """Of what came with one stamp.
 
     Attributes:
-        stamp, trigger: EquilibriumStatus.COMMAND, WRENCH or both.
+        stamp, trigger: EquilibriumStatus.COMMAND, WRENCH, POSE, or a wrench with one of the others.
         code: EquilibriumStatus.ACCEPTED, REFUSED, FAILED or SNAP.
         reason, message, hint: see the message's definition.
         loads: that were solved under; None: no load.
@@ -58,7 +59,7 @@ class Outcome:
     tip_distance: float = NAN
 
 
-def refused(stamp: Time, trigger: int, rejection: RejectedCommand | RejectedWrench) -> Outcome:
+def refused(stamp: Time, trigger: int, rejection: RejectedCommand | RejectedPose | RejectedWrench) -> Outcome:
     """It broke a rule."""
     return Outcome(stamp, trigger, EquilibriumStatus.REFUSED, rejection.reason.value, str(rejection))
 
@@ -68,7 +69,9 @@ def broken(stamp: Time, trigger: int, text: str) -> Outcome:
     return Outcome(stamp, trigger, EquilibriumStatus.FAILED, INTERNAL_ERROR, f"{text}; the last answer stays")
 
 
-def solved(stamp: Time, trigger: int, answer: Answer, loads: Loads | None, hint: str = "") -> Outcome:
+def solved(
+    stamp: Time, trigger: int, answer: Answer, loads: Loads | None, hint: str = "", tip_distance: float = NAN
+) -> Outcome:
     """It was solved for, and the answer sent where the verdict says so."""
     equilibrium, verdict = answer.equilibrium, answer.verdict
     code = EquilibriumStatus.ACCEPTED
@@ -78,7 +81,7 @@ def solved(stamp: Time, trigger: int, answer: Answer, loads: Loads | None, hint:
         code = EquilibriumStatus.SNAP
     reason = verdict.reason or equilibrium.status.value
     message = verdict.remark or equilibrium.message
-    return Outcome(stamp, trigger, code, reason, message, hint, loads, equilibrium, answer.solve_time)
+    return Outcome(stamp, trigger, code, reason, message, hint, loads, equilibrium, answer.solve_time, tip_distance)
 
 
 class StatusForms:

@@ -10,6 +10,7 @@ from rclpy.qos import ReliabilityPolicy
 
 from ctr_pvs import Status
 from ctr_pvs_ros.inputs.commands import Reason
+from ctr_pvs_ros.inputs.poses import PoseReason
 from ctr_pvs_ros.inputs.wrenches import WrenchReason
 from ctr_pvs_ros.outputs.outcomes import INTERNAL_ERROR
 from ctr_pvs_ros.parameters import PARAMETERS
@@ -118,6 +119,7 @@ def test_status_codes_and_reasons():
     assert told == {**{status.value: status.success for status in Status}, BAD_INPUT: False}
     assert [code(row[0])[0] for row in table("reason")] == [reason.value for reason in Reason]
     assert [code(row[0])[0] for row in table("refusal")] == [reason.value for reason in WrenchReason]
+    assert [code(row[0])[0] for row in table("pose refused")] == [reason.value for reason in PoseReason]
     assert [code(row[0])[0] for row in table("withheld")] == [SNAP_HELD, MARGIN_STOP, INTERNAL_ERROR]
 
 

@@ -1,0 +1,84 @@
+"""From a PoseStamped's frame and numbers to where the tip should be: checked, and refused with a reason."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from ctr_pvs import Equilibrium
+
+Array = NDArray[np.float64]
+
+GOALS = ("position", "tangent", "orientation")
+#: How far a quaternion's norm may be from 1; senders round.
+ABOUT_ONE = 1e-3
+FARTHEST = 10.0  # m
+
+
+class PoseReason(StrEnum):
+    """Why a pose was refused."""
+
+    UNKNOWN_FRAME = "unknown_frame"
+    NON_FINITE = "non_finite"
+    OUT_OF_LIMITS = "out_of_limits"
+    NO_START = "no_start"
+
+
+class RejectedPose(ValueError):
+    """A pose that changes nothing. The message is one line: what came, what was expected."""
+
+    def __init__(self, reason: PoseReason, message: str) -> None:
+        super().__init__(message)
+        self.reason = reason
+
+
+@dataclass(frozen=True, eq=False)
+class TipGoal:
+    """Where the tip should be: position (3,) [m], and its tangent (3,) or its whole orientation (4,) xyzw, if those
+    count."""
+
+    position: Array
+    tangent: Array | None = None
+    orientation: Array | None = None
+
+    def distance(self, answer: Equilibrium) -> float:
+        """[m] from an answer's tip to the position."""
+        return float(np.linalg.norm(answer.tip.position - self.position))
+
+
+def read_pose(
+    frame: str, position: tuple[float, ...], orientation: tuple[float, ...], frame_id: str, goal: str
+) -> TipGoal:
+    """What of a pose counts for `goal`, one of GOALS; raises RejectedPose.
+
+    Args:
+        frame: of the pose; empty stands for `frame_id`, the only one that is taken.
+        position, orientation: m, quaternion xyzw, which is read only where it counts.
+    """
+    if frame not in ("", frame_id):
+        rule = f"header.frame_id: expected {frame_id!r} or nothing, got {frame!r}"
+        raise RejectedPose(PoseReason.UNKNOWN_FRAME, rule)
+    if not all(map(math.isfinite, position)):
+        raise RejectedPose(PoseReason.NON_FINITE, f"position: expected finite numbers, got {position}")
+    if math.hypot(*position) > FARTHEST:
+        rule = f"at most {FARTHEST:g} m from the orifice"
+        raise RejectedPose(PoseReason.OUT_OF_LIMITS, f"position: expected {rule}, got {math.hypot(*position):g} m")
+    place = np.array(position)
+    if goal == "position":
+        return TipGoal(place)
+    if not all(map(math.isfinite, orientation)):
+        raise RejectedPose(PoseReason.NON_FINITE, f"orientation: expected finite numbers, got {orientation}")
+    size = math.hypot(*orientation)
+    if abs(size - 1.0) > ABOUT_ONE:
+        raise RejectedPose(PoseReason.OUT_OF_LIMITS, f"orientation: expected a unit quaternion, got norm {size:g}")
+    x, y, z, w = quaternion = np.array(orientation) / size
+    if goal == "orientation":
+        return TipGoal(place, orientation=quaternion)
+    tangent = np.array([1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + z * w), 2.0 * (x * z - y * w)])
+    return TipGoal(place, tangent=tangent)
