@@ -102,6 +102,7 @@ def three_tube_table(file: Path) -> str:
             (*TUBES, "alpha", "registration"), {"bounds": FREE, "priors": NO_PRIOR, "robust": 1e3}
         ),
         "tubes, translations and play": ((*TUBES, "D", "registration", *PLAY), squares),
+        "tubes, translations and play, robust": ((*TUBES, "D", "registration", *PLAY), {"bounds": PHYSICAL}),
         "tubes, joints and play": ((*TUBES, *JOINTS, *PLAY), squares),
         "tubes, joints and play, robust": ((*TUBES, *JOINTS, *PLAY), {"bounds": PHYSICAL}),
     }  # fmt: skip

@@ -20,10 +20,9 @@ from typing import TYPE_CHECKING
 
 from ctr_pvs.answer.status import Status
 from ctr_pvs.cli.calibrate import declare_calibrate
-from ctr_pvs.cli.follow import declare_follow
+from ctr_pvs.cli.live.view import declare_view
 from ctr_pvs.cli.loads import declare_loads
 from ctr_pvs.cli.loads import loads_in
-from ctr_pvs.cli.reach import declare_reach
 from ctr_pvs.cli.remarks import robot_warnings_told
 from ctr_pvs.cli.remarks import tell
 from ctr_pvs.cli.remarks import turn_hints
@@ -31,7 +30,12 @@ from ctr_pvs.cli.report import answer_as_json
 from ctr_pvs.cli.report import answer_as_text
 from ctr_pvs.cli.robots.convert import declare_convert
 from ctr_pvs.cli.robots.info import declare_info
+from ctr_pvs.cli.seeing.plot import declare_plot
+from ctr_pvs.cli.seeing.sweep import declare_sweep
+from ctr_pvs.cli.seeing.workspace import declare_workspace
 from ctr_pvs.cli.stability import declare_stability
+from ctr_pvs.cli.tips.follow import declare_follow
+from ctr_pvs.cli.tips.reach import declare_reach
 from ctr_pvs.cli.version import declare_version
 from ctr_pvs.cli.words import Parser
 from ctr_pvs.cli.words import UsageError
@@ -227,6 +231,10 @@ def _parser() -> Parser:
         declare_calibrate,
         declare_reach,
         declare_follow,
+        declare_plot,
+        declare_sweep,
+        declare_workspace,
+        declare_view,
     ):
         declare(subcommands)
     return parser

@@ -57,8 +57,13 @@ def shielded(words: Sequence[str]) -> list[str]:
     safe: list[str] = []
     for word in words:
         option, equals, value = word.partition("=")
-        if option.startswith("--") and equals and is_number(value):
+        if option.startswith("--") and equals and _is_numbers(value):
             safe += [option, f" {value}"]
         else:
-            safe.append(f" {word}" if word.startswith("-") and is_number(word) else word)
+            safe.append(f" {word}" if word.startswith("-") and _is_numbers(word) else word)
     return safe
+
+
+def _is_numbers(text: str) -> bool:
+    """Whether it is a number, or several with colons between them, as ranges have."""
+    return all(map(is_number, text.split(":")))

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 #: By the numbers of EquilibriumStatus.outcome and of the bits of .trigger.
 OUTCOMES = ("accepted", "refused", "failed", "snap")
-TRIGGERS = {1: "command", 2: "wrench"}
+TRIGGERS = {1: "command", 2: "wrench", 4: "pose"}
 ANSWERED = ("accepted", "snap")
 OF_STATUS = (
     "reason",

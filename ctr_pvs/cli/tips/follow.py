@@ -11,12 +11,12 @@ from typing import Any
 
 from ctr_pvs.answer.status import NoEquilibriumError
 from ctr_pvs.cli.loads import loads_in
-from ctr_pvs.cli.reach import command_table
-from ctr_pvs.cli.reach import declare_search
-from ctr_pvs.cli.reach import exit_code
-from ctr_pvs.cli.reach import no_start
-from ctr_pvs.cli.reach import save_joints
-from ctr_pvs.cli.reach import start_in
+from ctr_pvs.cli.tips.reach import command_table
+from ctr_pvs.cli.tips.reach import declare_search
+from ctr_pvs.cli.tips.reach import exit_code
+from ctr_pvs.cli.tips.reach import no_start
+from ctr_pvs.cli.tips.reach import save_joints
+from ctr_pvs.cli.tips.reach import start_in
 from ctr_pvs.cli.words import UsageError
 from ctr_pvs.cli.words import is_number
 from ctr_pvs.cli.words import number

@@ -1,0 +1,1 @@
+"""ctr-pvs reach and follow: commands for tips."""

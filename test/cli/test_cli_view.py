@@ -1,0 +1,222 @@
+"""ctr-pvs view: what sliders do, tried with and without viser, through its own handlers and without a browser."""
+
+from __future__ import annotations
+
+import socket
+import subprocess
+import sys
+import threading
+import urllib.request
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import yaml
+
+from ctr_pvs import EquilibriumSolver
+from ctr_pvs import Loads
+from ctr_pvs import load_robot
+from ctr_pvs.cli import main as cli
+from ctr_pvs.cli.live.mesh import RING
+from ctr_pvs.cli.live.mesh import tube_faces
+from ctr_pvs.cli.live.mesh import tube_vertices
+from ctr_pvs.cli.live.state import LiveRobot
+from ctr_pvs.cli.live.view import served
+
+ROOT = Path(__file__).parents[2]
+ROBOT = str(ROOT / "config" / "three_tubes.yaml")
+SEED = ROOT / "config" / "renda2021.yaml"
+
+
+def live(name=ROBOT) -> LiveRobot:
+    return LiveRobot(load_robot(name), 1e-5)
+
+
+# --- meshes -----------------------------------------------------------------------------------------------------------
+
+
+def test_a_mesh_is_closed_and_as_wide_and_long_as_the_tube(seed_robot):
+    answer = EquilibriumSolver(seed_robot).solve([0.0, 1.0], [0.0935, 0.1705])
+    backbone = answer.tube_backbone(1, 50)
+    vertices, faces = tube_vertices(backbone.position, backbone.orientation, 8e-4), tube_faces(50)
+    rings = vertices[:-2].reshape(50, RING, 3)
+    assert np.linalg.norm(rings - backbone.position[:, None], axis=2) == pytest.approx(8e-4)
+    tangents = np.gradient(backbone.position, backbone.s, axis=0)
+    assert np.abs(np.einsum("nrk,nk->nr", rings - backbone.position[:, None], tangents)).max() < 1e-3 * 8e-4 * 50
+    edges = [tuple(edge) for face in faces.tolist() for edge in zip(face, [*face[1:], face[0]], strict=True)]
+    assert len(set(edges)) == len(edges)  # each once in each direction: closed, and turned the same way everywhere
+    assert {(b, a) for a, b in edges} == set(edges)
+    corners = vertices[faces]
+    volume = np.einsum("nk,nk->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
+    area = 0.5 * RING * np.sin(2.0 * np.pi / RING) * 8e-4**2
+    assert volume == pytest.approx(area * answer.length, rel=1e-3)  # positive: seen from outside
+
+
+# --- what sliders do --------------------------------------------------------------------------------------------------
+
+
+def test_it_begins_in_the_middle_and_follows():
+    robot = live()
+    assert robot.shown.alpha.tolist() == [0.0, 0.0, 0.0]
+    assert robot.shown.D.tolist() == [0.07, 0.11, 0.16]
+    shown = robot.move([0.3, 1.0, -1.0], [0.06, 0.12, 0.2], [0.0, 0.1, 0.0])
+    answer = EquilibriumSolver(robot.robot).solve(shown.alpha, shown.D, loads=Loads(tip_force=(0.0, 0.1, 0.0)))
+    assert shown.good and shown.message == "stable equilibrium"
+    assert shown.tip.position == pytest.approx(answer.tip.position, abs=2e-5)
+    assert shown.torque == pytest.approx(answer.torque, abs=1e-4)
+    assert (shown.margin, shown.reserve) == pytest.approx((answer.stability_margin, answer.snap_reserve), abs=1e-3)
+    assert [tube.position[-1] for tube in shown.tubes][2] == pytest.approx(shown.tip.position)
+    assert len(robot.trace) == 2
+
+
+def test_a_command_beyond_the_limits_or_out_of_order_is_moved_and_told():
+    shown = live().move([7.0, 0.0, 0.0], [0.12, 0.05, 0.2], [0.0, 0.0, 0.0])
+    assert shown.alpha.tolist() == [6.3, 0.0, 0.0] and shown.D.tolist() == [0.12, 0.12, 0.2]
+    assert "alpha[0]" in shown.message and "D[1]" in shown.message
+
+
+def test_a_snap_is_announced_and_told():
+    robot = live(SEED)
+    for angle in (1.0, 3.0, 4.8):
+        shown = robot.move([0.0, angle], [0.0935, 0.2085], np.zeros(3))
+    assert shown.good and shown.snap_is_near and shown.reserve < 0.2
+    shown = robot.move([0.0, 5.5], [0.0935, 0.2085], np.zeros(3))
+    assert shown.message.startswith("SNAP on the way") and not shown.snap_is_near
+    shown = robot.reset()
+    assert shown.alpha.tolist() == [0.0, 0.0] and len(robot.trace) == 1 and "SNAP" not in shown.message
+
+
+def test_without_an_answer_it_stays_and_says_so(monkeypatch):
+    robot = live(SEED)
+    before = robot.move([0.0, 1.0], [0.0935, 0.2085], np.zeros(3))
+    monkeypatch.setattr("ctr_pvs.cli.live.state.BUDGET", 1e-9)
+    shown = robot.move([0.0, 40.0], [0.0935, 0.2085], np.zeros(3))
+    assert not shown.good and shown.message.startswith("timeout") and "last command that was answered" in shown.message
+    assert shown.tip is before.tip and shown.alpha is before.alpha
+
+
+def test_the_saved_command_is_yaml_with_all_digits():
+    robot = live()
+    shown = robot.move([0.1, 1.0 / 3.0, 0.0], [0.06, 0.12, 0.2], [0.0, 0.1, 0.0])
+    saved = yaml.safe_load(robot.command())
+    assert (saved["robot"], saved["tubes"]) == ("three_tubes", ["outer", "middle", "inner"])
+    assert saved["alpha"] == shown.alpha.tolist() and saved["D"] == shown.D.tolist()
+    assert saved["tip_force"] == [0.0, 0.1, 0.0] and saved["tip_position"] == shown.tip.position.tolist()
+
+
+# --- the page ---------------------------------------------------------------------------------------------------------
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+@pytest.fixture
+def page():
+    pytest.importorskip("viser")
+    page = served(load_robot(ROBOT), 1e-5, "127.0.0.1", free_port(), 1.0)
+    yield page
+    page.server.stop()
+
+
+@pytest.mark.filterwarnings("default")
+def test_the_page_is_served_and_needs_no_other_server(page):
+    with urllib.request.urlopen(f"http://127.0.0.1:{page.server.get_port()}/", timeout=10) as answer:
+        text = answer.read().decode()
+    assert "<script" in text and 'src="http' not in text and 'href="http' not in text
+
+
+@pytest.mark.filterwarnings("default")
+def test_a_slider_moves_the_tip(page):
+    before = [mesh.vertices.copy() for mesh in page.tubes]
+    page.alpha[2].value = 90.0  # assigning runs the handlers, as a browser does
+    assert page.live.shown.alpha[2] == pytest.approx(np.pi / 2.0)
+    assert np.abs(page.tubes[2].vertices - before[2]).max() > 0.05  # 5 mm
+    tip = 10.0 * page.live.shown.tip.position
+    assert page.tip.position == pytest.approx(tip) and page.tubes[2].vertices[-1] == pytest.approx(tip, abs=1e-5)
+    assert page.trace.points.shape == (1, 2, 3)
+    page.force[1].value = 0.5
+    assert page.live.shown.tip_force.tolist() == [0.0, 0.5, 0.0]
+    assert np.linalg.norm(page.arrow.points[0, 1] - page.arrow.points[0, 0]) > 0.1
+    assert "stability margin" in page.margin_told.content and page.margin.value > 50.0
+    assert page.table.content.count("\n| ") == 5  # a head, a line under it, three tubes
+
+
+@pytest.mark.filterwarnings("default")
+def test_sliders_out_of_order_are_put_where_the_robot_is(page):
+    page.D[0].value = 140.0
+    assert [slider.value for slider in page.D] == pytest.approx([140.0, 140.0, 160.0])
+    assert "D[1]" in page.message.content
+    page.D[2].value = 300.0  # all of the inner tube is behind the orifice
+    assert page.tubes[2].visible is False and page.tubes[1].visible is True
+
+
+@pytest.mark.filterwarnings("default")
+def test_reset_clear_and_save(page):
+    sent = []
+    client = SimpleNamespace(send_file_download=lambda name, content: sent.append((name, content)))
+    page.alpha[0].value = 50.0
+    page._save(SimpleNamespace(client=client))
+    assert sent[0][0] == "three_tubes_command.yaml"
+    assert yaml.safe_load(sent[0][1])["alpha"] == page.live.shown.alpha.tolist()
+    page._clear(None)
+    assert len(page.trace.points) == 0
+    page._reset(None)
+    assert page.alpha[0].value == 0.0 and page.live.shown.alpha.tolist() == [0.0, 0.0, 0.0]
+
+
+@pytest.mark.filterwarnings("default")
+def test_many_events_at_once_end_at_the_newest_value(page):
+    slider = page.alpha[1]
+    threads = [threading.Thread(target=setattr, args=(slider, "value", float(angle))) for angle in range(1, 30)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(timeout=60)
+    page.changed()
+    assert np.degrees(page.live.shown.alpha[1]) == pytest.approx(slider.value)
+
+
+# --- the command line -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("words", [["--port", "0"], ["--largest-force", "0"], ["--port", "x"]])
+def test_bad_input_is_one_line(capsys, words):
+    assert cli.main(["view", ROBOT, *words]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == "" and words[0] in captured.err and len(captured.err.splitlines()) == 1
+
+
+def test_without_viser(capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "viser", None)
+    assert cli.main(["view", ROBOT]) == 2
+    assert capsys.readouterr().err == "ctr-pvs: view needs viser (pip install 'ctr_pvs[view]')\n"
+
+
+def test_a_port_that_is_taken_is_told(capsys):
+    pytest.importorskip("viser")
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        assert cli.main(["view", ROBOT, "--port", str(other.getsockname()[1])]) == 2
+    assert "cannot serve at 127.0.0.1" in capsys.readouterr().err
+
+
+def test_ctrl_c_ends_it_and_nobody_else_can_reach_it():
+    pytest.importorskip("viser")
+    port = free_port()
+    command = [sys.executable, "-m", "ctr_pvs", "view", ROBOT, "--port", str(port)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, cwd=ROOT)
+    try:
+        assert any(f"three_tubes: http://127.0.0.1:{port} (Ctrl-C ends)" in line for line in process.stdout)
+        listening = Path("/proc/net/tcp").read_text().split()
+        assert f"0100007F:{port:04X}" in listening and f"00000000:{port:04X}" not in listening
+        process.send_signal(2)
+        assert process.wait(timeout=60) == 0
+    finally:
+        process.kill()
+        process.wait()
+        process.stdout.close()
