@@ -11,7 +11,4 @@ import pytest
 
 def some(values: Sequence[Any], keep: Collection[int]) -> list[Any]:
     """``values`` as parameters: now those whose places are in ``keep``, the others in the long run (``make soak``)."""
-    return [
-        value if i in keep else pytest.param(*(value if isinstance(value, tuple) else (value,)), marks=pytest.mark.soak)
-        for i, value in enumerate(values)
-    ]
+    return [v if i in keep else pytest.param(v, marks=pytest.mark.soak) for i, v in enumerate(values)]

@@ -105,9 +105,10 @@ def test_compliance_and_load_jacobian_by_differences(seed: int, moments: bool, t
 MANY = [(seed, 1 + seed % 3) for seed in range(200)]
 
 
-@pytest.mark.parametrize(("seed", "tubes"), some(MANY, range(9)))
-def test_identities_of_forces(seed: int, tubes: int):
+@pytest.mark.parametrize("of", some(MANY, range(9)))
+def test_identities_of_forces(of: tuple[int, int]):
     """d tau / d wrench = -(d tip / dq)^T, the compliance is symmetric, and so are the rates of torques by rotations."""
+    seed, tubes = of
     scene = Scene(seed, False, tubes)
     here = scene.here
     assert agree(here.load_jacobian, -here.jacobian.T, 1e-6)
