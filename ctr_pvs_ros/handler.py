@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
@@ -35,13 +37,12 @@ from ctr_pvs_ros.outputs.outputs import Sent
 from ctr_pvs_ros.outputs.publishers import Publishers
 from ctr_pvs_ros.outputs.serialized import stamp_bytes
 from ctr_pvs_ros.parameters import Settings
-from ctr_pvs_ros.stream import Answer
 from ctr_pvs_ros.stream import Policy
 from ctr_pvs_ros.stream import Stream
+from ctr_pvs_ros.stream import Tried
 from ctr_pvs_ros.tip_servo import TipServo
 
 if TYPE_CHECKING:
-    from ctr_pvs import Equilibrium
     from ctr_pvs import EquilibriumSolver
 
 NAN = float("nan")
@@ -49,6 +50,10 @@ LOG_PERIOD = 2.0  # s; at most one line of a kind in this time
 COMMAND, WRENCH, POSE = EquilibriumStatus.COMMAND, EquilibriumStatus.WRENCH, EquilibriumStatus.POSE
 #: The ways of poses never snap: who asks for a place of the tip asks for no leap.
 HOLD = "hold"
+LEAST_BUDGET = 1e-4  # s; a try that comes too late still ends as one that is out of time
+
+Array = NDArray[np.float64]
+Attempt = Callable[[Callable[[Array, Array], Tried]], Tried]
 
 
 class Handler:
@@ -95,7 +100,7 @@ class Handler:
         load, last = self._load, self._stream.last
         # A load is kept for the command to come while there is no answer yet, or commands are refused after a snap.
         if load.unanswered is not None and last is not None and not self._stream.stopped:
-            self._solve(last, load.unanswered, WRENCH)
+            self._solve(lambda try_out: try_out(last.alpha, last.D), load.unanswered, WRENCH)
 
     def start_with(self, command: Command) -> None:
         """Answer a command that no message brought."""
@@ -144,15 +149,11 @@ class Handler:
             goal = read_pose(message.header.frame_id, *numbers, settings.frame_id, settings.servo_cp_goal)
             if last is None:
                 raise RejectedPose(PoseReason.NO_START, "the tip is nowhere yet: expected a command on servo_jp first")
-            command = Command(*self._servo().step(last, goal, self._try_out))
-            self._solve(command, stamp, self._trigger(POSE), goal=goal)
+            command = self._solve(lambda try_out: self._servo().step(last, goal, try_out), stamp, POSE, goal=goal)
         except (RejectedCommand, RejectedPose) as rejection:
             self._refuse(stamp, POSE, rejection)
         else:
             self.report.accepted(command)
-
-    def _try_out(self, alpha: NDArray[np.float64], D: NDArray[np.float64]) -> Equilibrium:
-        return self._stream.try_out(Command(alpha, D), self.settings.compute_budget, self._load.loads)
 
     def _servo(self) -> TipServo:
         """For the limits and rates that hold."""
@@ -178,23 +179,26 @@ class Handler:
     def _follow(self, command: Command, stamp: Time) -> None:
         """Answer a new command."""
         hint = "; ".join(command.notes + command.hints)
-        self._solve(command, stamp, self._trigger(COMMAND), hint)
+        self._solve(lambda try_out: try_out(command.alpha, command.D), stamp, COMMAND, hint)
         self.report.accepted(command)
         if hint:
             self._log.warning(f"command accepted, but {hint}", throttle_duration_sec=LOG_PERIOD)
 
-    def _trigger(self, kind: int) -> int:
-        """A wrench that waits is answered along."""
-        return kind if self._load.unanswered is None else kind | WRENCH
+    def _solve(
+        self, attempt: Attempt, stamp: Time, trigger: int, hint: str = "", goal: TipGoal | None = None
+    ) -> Command:
+        """Solve under the load that acts, and let the answer go where it may; returns the command that was solved for.
 
-    def _solve(self, command: Command, stamp: Time, trigger: int, hint: str = "", goal: TipGoal | None = None) -> None:
-        """Solve under the load that acts, and let the answer go where it may."""
-        settings = self.settings
+        A wrench that waits is answered along. All tries of an attempt share one budget.
+        """
+        settings, loads = self.settings, self._load.loads
+        if self._load.unanswered is not None:
+            trigger |= WRENCH
         on_snap = HOLD if goal is not None and settings.on_snap == "follow" else settings.on_snap
         policy = Policy(on_snap, settings.margin_warn, settings.margin_stop)
-        loads = self._load.loads
         with self._failures_told(stamp, trigger):
-            answer = self._interruptible(command, policy, loads)
+            tried = self._interruptible(attempt, loads)
+            answer = self._stream.settle(tried, policy)
             self._load.solved(self._stream.orientation)
             if answer.verdict.publish:
                 stamped = stamp_bytes(stamp.sec, stamp.nanosec)
@@ -206,13 +210,19 @@ class Handler:
             self._log.error(answer.verdict.remark, throttle_duration_sec=LOG_PERIOD)
         elif answer.verdict.remark:
             self._log.warning(answer.verdict.remark, throttle_duration_sec=LOG_PERIOD)
+        return tried.command
 
-    def _interruptible(self, command: Command, policy: Policy, loads: Loads | None) -> Answer:
+    def _interruptible(self, attempt: Attempt, loads: Loads | None) -> Tried:
+        deadline = time.monotonic() + self.settings.compute_budget
+
+        def try_out(alpha: Array, D: Array) -> Tried:
+            return self._stream.try_out(Command(alpha, D), max(deadline - time.monotonic(), LEAST_BUDGET), loads)
+
         self.solving = True
         try:
             if self.interrupted:  # the signal came before there was a solve for it to end
                 raise KeyboardInterrupt
-            return self._stream.follow(command, policy, self.settings.compute_budget, loads)
+            return attempt(try_out)
         finally:
             self.solving = False
 
@@ -221,7 +231,7 @@ class Handler:
         """A fault of the node itself is told of as the outcome, and goes on to who logs it."""
         try:
             yield
-        except RejectedCommand:
+        except (RejectedCommand, RejectedPose):
             raise
         except Exception as error:
             self._outputs.tell(outcomes.broken(stamp, trigger, f"{type(error).__name__}: {error}"))

@@ -53,6 +53,17 @@ class Answer:
     solve_time: float
 
 
+@dataclass(frozen=True, eq=False)
+class Tried:
+    """A command that was solved for, and nothing more: what came of it, the wall-clock time it took [s], and the solver
+    that goes on from there."""
+
+    command: Command
+    equilibrium: Equilibrium
+    solve_time: float
+    solver: EquilibriumSolver
+
+
 def judge(equilibrium: Equilibrium, policy: Policy) -> Verdict:
     """Decide on one answer."""
     margin = equilibrium.stability_margin
@@ -95,12 +106,8 @@ class Stream:
         """Accept commands again after a snap under on_snap = stop."""
         self.stopped = False
 
-    def try_out(self, command: Command, budget: float, loads: Loads | None = None) -> Equilibrium:
-        """What `follow` would find; nothing goes out and nothing changes."""
-        return copy.copy(self._solver).solve(command.alpha, command.D, start="warm", budget=budget, loads=loads)
-
-    def follow(self, command: Command, policy: Policy, budget: float, loads: Loads | None = None) -> Answer:
-        """Solve for a command under `loads` from the last answer that went out, within `budget` [s].
+    def try_out(self, command: Command, budget: float, loads: Loads | None = None) -> Tried:
+        """Solve for a command under `loads` from the last answer that went out, within `budget` [s]. Nothing changes.
 
         Raises:
             RejectedCommand: stopped after a snap.
@@ -111,10 +118,18 @@ class Stream:
         solver = copy.copy(self._solver)
         began = time.perf_counter()
         equilibrium = solver.solve(command.alpha, command.D, start="warm", budget=budget, loads=loads)
-        solve_time = time.perf_counter() - began
+        return Tried(command, equilibrium, time.perf_counter() - began, solver)
+
+    def settle(self, tried: Tried, policy: Policy) -> Answer:
+        """Decide on what was tried last: whether it goes out, and is where the next command starts from."""
+        equilibrium = tried.equilibrium
         verdict = judge(equilibrium, policy)
         if verdict.publish:
-            self._solver, self.last, self._published = solver, command, equilibrium
+            self._solver, self.last, self._published = tried.solver, tried.command, equilibrium
         elif equilibrium.status is Status.SNAP and policy.on_snap == "stop":
             self.stopped = True
-        return Answer(equilibrium, verdict, solve_time)
+        return Answer(equilibrium, verdict, tried.solve_time)
+
+    def follow(self, command: Command, policy: Policy, budget: float, loads: Loads | None = None) -> Answer:
+        """Solve for a command, and decide; see `try_out` and `settle`."""
+        return self.settle(self.try_out(command, budget, loads), policy)

@@ -9,11 +9,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ctr_pvs import NoEquilibriumError
 from ctr_pvs import Robot
+from ctr_pvs_ros.inputs.poses import PoseReason
+from ctr_pvs_ros.inputs.poses import RejectedPose
 from ctr_pvs_ros.inputs.poses import TipGoal
 
 if TYPE_CHECKING:
     from ctr_pvs import Equilibrium
+    from ctr_pvs_ros.stream import Tried
 
 Array = NDArray[np.float64]
 
@@ -44,14 +48,15 @@ class TipServo:
         self._rates = rates / self._bounds.scale
         self._last = -np.inf  # when the last pose came, on a steady clock [s]
 
-    def step(
-        self, answer: Equilibrium, goal: TipGoal, try_out: Callable[[Array, Array], Equilibrium]
-    ) -> tuple[Array, Array]:
-        """alpha (N,) [rad] and D (N,) [m] that lead from an answer towards the goal, or those of the answer, where no
-        step does that was tried: out of reach, rates foretell little.
+    def step(self, answer: Equilibrium, goal: TipGoal, try_out: Callable[[Array, Array], Tried]) -> Tried:
+        """What was tried that leads from an answer towards the goal; the answer's own command, where no step does: out
+        of reach, rates foretell little.
 
         Args:
-            try_out: the answer to a command that does not go out.
+            try_out: solves for alpha (N,) [rad] and D (N,) [m].
+
+        Raises:
+            RejectedPose: the answer has no rates.
         """
         from ctr_pvs.tasks.aim import Aim
         from ctr_pvs.tasks.descent import DAMPING
@@ -59,7 +64,10 @@ class TipServo:
         now = time.monotonic()
         period, self._last = min(now - self._last, LONGEST_PERIOD), now
         aim = Aim(goal.position, goal.tangent, goal.orientation, 1.0, 1.0, LEVER)
-        off, rates = aim.residual(answer), aim.jacobian(answer) * self._bounds.scale
+        try:
+            off, rates = aim.residual(answer), aim.jacobian(answer) * self._bounds.scale
+        except NoEquilibriumError as error:
+            raise RejectedPose(PoseReason.NO_RATES, f"{error}; expected a command on servo_jp") from error
         left = float(off @ off)
         # Far from the goal the rates say little of the way: damping grows with the distance, as in inverse kinematics.
         held = rates.T @ rates + (LEAST_EFFECT**2 + DAMPING * left) * np.eye(rates.shape[1])
@@ -68,8 +76,9 @@ class TipServo:
         d = d / max(1.0, float((np.abs(d) / (self._rates * period)).max()))
         for _ in range(TRIES if left > THERE**2 else 0):
             command = self._bounds.command(x + d)
-            there = try_out(*command)
+            tried = try_out(*command)
+            there = tried.equilibrium
             if there.success and not there.snaps and float(np.sum(aim.residual(there) ** 2)) < left:
-                return command
+                return tried
             d = SHORTENED * d
-        return answer.alpha, answer.D
+        return try_out(answer.alpha, answer.D)

@@ -82,7 +82,7 @@ def timed_node(times: Times) -> Node:
     """The production node; only this process's copies of its functions are wrapped."""
     for owner, name, part in (
         (Handler, "answer", "in all"),
-        (Stream, "follow", "solve"),
+        (Stream, "try_out", "solve"),
         (Output, "publish", "publish"),
     ):
         setattr(owner, name, _method(getattr(owner, name), times[part]))

@@ -28,6 +28,7 @@ class PoseReason(StrEnum):
     NON_FINITE = "non_finite"
     OUT_OF_LIMITS = "out_of_limits"
     NO_START = "no_start"
+    NO_RATES = "no_rates"
 
 
 class RejectedPose(ValueError):

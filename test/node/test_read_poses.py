@@ -7,10 +7,13 @@ import numpy as np
 import pytest
 
 from ctr_pvs import EquilibriumSolver
+from ctr_pvs import NoEquilibriumError
+from ctr_pvs_ros.inputs.commands import Command
 from ctr_pvs_ros.inputs.poses import GOALS
 from ctr_pvs_ros.inputs.poses import PoseReason
 from ctr_pvs_ros.inputs.poses import RejectedPose
 from ctr_pvs_ros.inputs.poses import read_pose
+from ctr_pvs_ros.stream import Stream
 from ctr_pvs_ros.tip_servo import LONGEST_PERIOD
 from ctr_pvs_ros.tip_servo import TipServo
 
@@ -20,8 +23,12 @@ TURNED = (0.0, 0.0, math.sin(0.3), math.cos(0.3))  # about z, by 0.6 rad
 
 @pytest.fixture
 def try_out(seed_robot):
-    solver = EquilibriumSolver(seed_robot)
-    return lambda alpha, D: solver.fork().solve(alpha, D)
+    stream = Stream(EquilibriumSolver(seed_robot))
+    return lambda alpha, D: stream.try_out(Command(alpha, D), 1.0)
+
+
+def joints(tried):
+    return tried.command.alpha, tried.command.D
 
 
 @pytest.fixture
@@ -60,40 +67,65 @@ def test_a_bad_pose_is_refused_with_the_reason(frame, position, orientation, goa
 
 def test_a_step_leads_there(seed_robot, answer, try_out):
     """From 0.1 mm away to within the square of that over the size of the robot."""
-    solver, servo = EquilibriumSolver(seed_robot), TipServo(seed_robot, 0.0, 0.0)
+    servo = TipServo(seed_robot, 0.0, 0.0)
     for way in np.eye(3):
         goal = read_pose("", tuple(answer.tip.position + 1e-4 * way), TURNED, "base", "position")
-        alpha, D = servo.step(answer, goal, try_out)
-        assert goal.distance(solver.solve(alpha, D)) < 1e-6
+        assert goal.distance(servo.step(answer, goal, try_out).equilibrium) < 1e-6
 
 
 @pytest.mark.parametrize("goal", GOALS)
 def test_where_the_tip_is_it_stays(seed_robot, answer, goal, try_out):
     tip = answer.tip
     at = read_pose("", tuple(tip.position), tuple(tip.orientation), "base", goal)
-    alpha, D = TipServo(seed_robot, 0.0, 0.0).step(answer, at, try_out)
+    alpha, D = joints(TipServo(seed_robot, 0.0, 0.0).step(answer, at, try_out))
     assert alpha == pytest.approx(answer.alpha, abs=1e-9) and pytest.approx(answer.D, abs=1e-10) == D
 
 
 def test_rates_bound_a_step_and_keep_its_direction(seed_robot, answer, try_out):
     far = read_pose("", tuple(answer.tip.position + np.array([0.0, 0.01, 0.01])), TURNED, "base", "position")
-    free = TipServo(seed_robot, 0.0, 0.0).step(answer, far, try_out)
+    free = joints(TipServo(seed_robot, 0.0, 0.0).step(answer, far, try_out))
     servo = TipServo(seed_robot, 0.5, 0.01)
-    bound = servo.step(answer, far, try_out)
+    bound = joints(servo.step(answer, far, try_out))
     turns, slides = bound[0] - answer.alpha, bound[1] - answer.D
     assert np.abs(turns).max() <= 0.5 * LONGEST_PERIOD * (1.0 + 1e-9)
     assert np.abs(slides).max() <= 0.01 * LONGEST_PERIOD * (1.0 + 1e-9)
     share = turns / (free[0] - answer.alpha)
     assert share == pytest.approx(share[0]) and 0.0 < share[0] < 1.0
     time.sleep(0.01)  # since the last pose
-    soon = servo.step(answer, far, try_out)
+    soon = joints(servo.step(answer, far, try_out))
     assert np.abs(soon[0] - answer.alpha).max() < np.abs(turns).max()
+
+
+def test_one_solve_is_enough_for_a_step_that_leads_nearer(seed_robot, answer, try_out):
+    tried = []
+
+    def counted(alpha, D):
+        tried.append(try_out(alpha, D))
+        return tried[-1]
+
+    goal = read_pose("", tuple(answer.tip.position + np.array([0.0, 1e-4, 0.0])), TURNED, "base", "position")
+    step = TipServo(seed_robot, 0.0, 0.0).step(answer, goal, counted)
+    assert tried == [step]
+
+
+def test_a_state_without_rates_is_refused(seed_robot, answer, try_out):
+    class WithoutRates:
+        tip, alpha, D = answer.tip, answer.alpha, answer.D
+
+        @property
+        def jacobian(self):
+            raise NoEquilibriumError("an unstable equilibrium has no rates")
+
+    goal = read_pose("", PLACE, TURNED, "base", "position")
+    with pytest.raises(RejectedPose, match=r"no rates.*servo_jp") as caught:
+        TipServo(seed_robot, 0.0, 0.0).step(WithoutRates(), goal, try_out)
+    assert caught.value.reason is PoseReason.NO_RATES
 
 
 def test_a_step_keeps_to_limits_and_order(seed_robot, answer, try_out):
     """A tip that should be ahead of all tubes presses them in as far as they go."""
     servo = TipServo(seed_robot, 0.0, 0.0)
     goal = read_pose("", (5.0, 0.0, 0.0), TURNED, "base", "position")
-    alpha, D = servo.step(answer, goal, try_out)
+    alpha, D = joints(servo.step(answer, goal, try_out))
     seed_robot.check_command(alpha, D)
     assert D[1] < answer.D[1]

@@ -2,11 +2,14 @@
 does not end it, a signal is not outlived by a solve, and diagnostics wait for their turn."""
 
 import time
+from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
+from geometry_msgs.msg import PoseStamped
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 
@@ -19,6 +22,7 @@ from ctr_pvs_ros.process import share_file
 from ctr_pvs_ros.service.jobs import Job
 from ctr_pvs_ros.service.jobs import do
 from ctr_pvs_ros.service.jobs import robot_of
+from ctr_pvs_ros.tip_servo import TRIES
 
 ROBOT = str(share_file("config", "renda2021.yaml"))
 JOINTS = ["outer_rotation", "outer_translation", "inner_rotation", "inner_translation"]
@@ -149,3 +153,27 @@ def test_a_robot_that_looks_wrong_is_told_of_once_in_the_log_and_for_good_in_dia
     logged = [line for line in capfd.readouterr().err.splitlines() if remark in line]
     assert len(logged) == 1
     assert "[WARN]" in logged[0]
+
+
+def test_the_steps_of_a_pose_share_one_budget_and_end_with_a_signal(node, monkeypatch):
+    """However many are tried; a signal ends the first that comes after it."""
+    command(node)
+    budgets = []
+    monkeypatch.setattr(
+        node.handler._stream, "try_out", lambda command, budget, loads: budgets.append(budget) or late()
+    )
+    (poses,) = (each for each in node.subscriptions if each.topic_name == "/faulty/servo_cp")
+    far = PoseStamped()
+    far.pose.position.x = 0.2
+
+    def late():
+        time.sleep(0.01)
+        return SimpleNamespace(equilibrium=SimpleNamespace(success=False))
+
+    poses.callback(far)
+    assert len(budgets) == TRIES + 1
+    assert all(b <= a - 0.01 for a, b in pairwise(budgets))
+    node.handler.interrupted = True
+    poses.callback(far)
+    assert len(budgets) == TRIES + 1
+    assert not node.handler.solving
