@@ -39,3 +39,12 @@ def random_D(rng: np.random.Generator, robot: Robot) -> np.ndarray:
         D += 0.001 * np.arange(robot.n_tubes)
         if np.all(lengths > D):
             return D
+
+
+def two_tubes(lam: float, b: float, length: float = 0.1) -> tuple[Robot, list[float]]:
+    """Two equal tubes with dimensionless coupling ``lam`` and guide length ``b``, and the D that gives it."""
+    K, G = 0.02, 0.02 / 1.3
+    curvature = np.sqrt(lam / (length**2 * (K / 2) * (2 / G)))
+    guided = max(b * length, 1e-7)
+    tubes = tuple(Tube(n, (Segment(guided, K, G), Segment(length, K, G, (curvature,)))) for n in "ab")
+    return Robot("pair", tubes), [b * length, b * length]

@@ -5,11 +5,16 @@ What runs it is always another process: in this one the package is the real one.
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import shutil
 import subprocess
 import sys
+import time
+from collections.abc import Callable
 from pathlib import Path
+
+import pytest
 
 KERNEL = Path(__file__).resolve().parents[2] / "ctr_pvs" / "kernel"
 
@@ -60,6 +65,15 @@ def slow{n}(x):
     + "    return s\n"
     for n in (1, 2)
 )
+
+needs_numba = pytest.mark.skipif(importlib.util.find_spec("numba") is None, reason="Numba is not installed")
+
+#: One line: what runs, and the sum of 0, 1, 2 doubled.
+ADD = "print(compiler.mode(), entries.add(np.arange(3.0)))\n"
+INTERPRETED, COMPILED = ["interpreted 6.0"], ["compiled 6.0"]
+WHY = "print(compiler.why())\n"
+SLOWER = "kernels run interpreted, slower, with the same numbers"
+AT_ONCE = 2.0  # s, for what ends when it is told to
 
 
 class Toy:
@@ -113,3 +127,28 @@ class Toy:
         """Lines that ``program`` prints, warnings being errors; the names below are imported for it."""
         imports = "import numpy as np\nfrom ctr_pvs.kernel import compiler, entries\n"
         return self.run("-W", "error", "-c", imports + program, **environment).splitlines()
+
+
+def folders(toy: Toy) -> list[Path]:
+    """What lies in the cache, the lock left out."""
+    return [path for path in (toy.cache / "ctr_pvs").glob("*") if path.is_dir()]
+
+
+def processes(toy: Toy) -> list[int]:
+    """Processes that run code of ``toy``, by the path they look for modules on."""
+    found = []
+    for process in Path("/proc").glob("[0-9]*"):
+        try:
+            if str(toy.code).encode() in (process / "environ").read_bytes():
+                found.append(int(process.name))
+        except OSError:
+            continue  # ended meanwhile
+    return found
+
+
+def wait_for(condition: Callable[[], bool], seconds: float, what: str) -> None:
+    """Fails with ``what`` where the condition is not met in time."""
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline, what
+        time.sleep(0.02)
