@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import root
 
 from bench.loaded.loaded_judge import LoadedJudge
 from bench.loaded.loaded_judge import LoadedPath
@@ -21,9 +20,9 @@ from bench.loaded.loaded_judge import Place
 from bench.loaded.random_loaded_sweeps import place_of
 from bench.stability.judges import Judge
 from bench.stability.judges import Kind
-from bench.stability.methods import LAST_STEP
-from bench.stability.methods import NEWTON_STEPS
 from bench.stability.methods import Answer
+from bench.stability.methods import by_root
+from bench.stability.methods import newton
 from ctr_pvs import EquilibriumSolver
 from ctr_pvs import Loads
 from ctr_pvs import Robot
@@ -152,15 +151,7 @@ class Newton(_Discretised):
     """Full Newton steps until one is short."""
 
     def run(self, x: Array, alpha: Array) -> tuple[Array, bool]:
-        for _ in range(NEWTON_STEPS):
-            try:
-                step = np.linalg.solve(self.slope(x, alpha), self.left(x, alpha))
-            except np.linalg.LinAlgError:
-                return x, False
-            x = x - step
-            if np.abs(step).max() < LAST_STEP:
-                return x, True
-        return x, False
+        return newton(self.left, self.slope, x, alpha)
 
 
 class Hybr(_Discretised):
@@ -169,8 +160,7 @@ class Hybr(_Discretised):
     name = "hybr"
 
     def run(self, x: Array, alpha: Array) -> tuple[Array, bool]:
-        found = root(self.left, x, (alpha,), self.name, self.slope)
-        return found.x, bool(found.success)
+        return by_root(self.name, self.left, self.slope, x, alpha)
 
 
 class LM(Hybr):

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from abc import ABC
 from abc import abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,6 +28,7 @@ from ctr_pvs.oracles.standard_model import solve_standard_bvp
 from ctr_pvs.oracles.standard_model import solve_standard_shooting
 
 Array = NDArray[np.float64]
+Equations = Callable[[Array, Array], Array]
 
 #: Of the twist rates, in every section: the error this leaves is far below what the judges can see.
 DEGREE = 9
@@ -43,6 +45,25 @@ class Answer:
     success: bool
     snapped: bool
     field: AngleField | None
+
+
+def newton(equations: Equations, jacobian: Equations, x: Array, alpha: Array) -> tuple[Array, bool]:
+    """Full Newton steps from x until one is short; whether that came."""
+    for _ in range(NEWTON_STEPS):
+        try:
+            step = np.linalg.solve(jacobian(x, alpha), equations(x, alpha))
+        except np.linalg.LinAlgError:
+            return x, False
+        x = x - step
+        if np.abs(step).max(initial=0.0) < LAST_STEP:
+            return x, True
+    return x, False
+
+
+def by_root(name: str, equations: Equations, jacobian: Equations, x: Array, alpha: Array) -> tuple[Array, bool]:
+    """``scipy.optimize.root`` from x by the method of that name, and what it says of success."""
+    found = root(equations, x, (alpha,), name, jacobian)
+    return found.x, bool(found.success)
 
 
 class Method(ABC):
@@ -97,15 +118,7 @@ class Newton(_Discretised):
     """Full Newton steps until one is short."""
 
     def run(self, x: Array, alpha: Array) -> tuple[Array, bool]:
-        for _ in range(NEWTON_STEPS):
-            try:
-                step = np.linalg.solve(self.jacobian(x, alpha), self.equations(x, alpha))
-            except np.linalg.LinAlgError:
-                return x, False
-            x = x - step
-            if np.abs(step).max(initial=0.0) < LAST_STEP:
-                return x, True
-        return x, False
+        return newton(self.equations, self.jacobian, x, alpha)
 
 
 class Hybr(_Discretised):
@@ -114,8 +127,7 @@ class Hybr(_Discretised):
     name = "hybr"
 
     def run(self, x: Array, alpha: Array) -> tuple[Array, bool]:
-        found = root(self.equations, x, (alpha,), self.name, self.jacobian)
-        return found.x, bool(found.success)
+        return by_root(self.name, self.equations, self.jacobian, x, alpha)
 
 
 class LM(Hybr):

@@ -10,7 +10,6 @@ right: it brings the compiler along, which takes longer than all the rest.
 from __future__ import annotations
 
 import argparse
-import math
 import os
 import sys
 from collections.abc import Callable
@@ -18,11 +17,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ctr_pvs.answer.status import Status
 from ctr_pvs.cli.calibrate import declare_calibrate
+from ctr_pvs.cli.command import BAD_INPUT
+from ctr_pvs.cli.command import SUCCESS
+from ctr_pvs.cli.command import command_in
+from ctr_pvs.cli.command import declare_command
+from ctr_pvs.cli.command import declare_robot
+from ctr_pvs.cli.command import exit_code
 from ctr_pvs.cli.live.view import declare_view
-from ctr_pvs.cli.loads import declare_loads
-from ctr_pvs.cli.loads import loads_in
 from ctr_pvs.cli.remarks import robot_warnings_told
 from ctr_pvs.cli.remarks import tell
 from ctr_pvs.cli.remarks import turn_hints
@@ -39,25 +41,17 @@ from ctr_pvs.cli.tips.reach import declare_reach
 from ctr_pvs.cli.version import declare_version
 from ctr_pvs.cli.words import Parser
 from ctr_pvs.cli.words import UsageError
-from ctr_pvs.cli.words import number
 from ctr_pvs.cli.words import shielded
 from ctr_pvs.cli.words import whole_number
 from ctr_pvs.errors import FieldError
 from ctr_pvs.errors import RobotFileError
-from ctr_pvs.robot.file import load_robot
-from ctr_pvs.robot.loads import check_loads
 
 if TYPE_CHECKING:
-    from ctr_pvs.answer.equilibrium import Equilibrium
-
-SUCCESS = 0
-BAD_INPUT = 2
-NO_STABLE_EQUILIBRIUM = 3
-NO_ANSWER_IN_TIME_OR_TOLERANCE = 4
+    pass
 
 EXIT_CODES = (
     "Exit codes: 0 success, 2 bad input, 3 no stable equilibrium, 4 not converged, tolerance missed or out of time, "
-    "5 a target that was not reached."
+    "5 a target that was not reached, 130 stopped by Ctrl-C with what was done kept."
 )
 
 MOST_POSES = 100_000
@@ -97,17 +91,8 @@ def _declare_solve(subcommands: argparse._SubParsersAction[Parser]) -> None:
         description="Solves for the equilibrium of a robot. Give one rotation and one translation per tube, outermost "
         "first. The model has no friction and no clearance, and is quasi-static.",
     )
-    solve.add_argument("robot", metavar="ROBOT", help="robot file (YAML), or the name of a shipped robot")
-    solve.add_argument(
-        "--alpha", nargs="+", type=number, required=True, metavar="A", help="base rotation of each tube [rad]"
-    )
-    solve.add_argument(
-        "--D", nargs="+", type=number, required=True, metavar="D", help="base-to-orifice distance of each tube [m]"
-    )
-    solve.add_argument("--degrees", action="store_true", help="--alpha is in degrees; text output shows degrees too")
-    solve.add_argument(
-        "--tolerance", type=number, default=1e-5, metavar="M", help="largest error of the tip [m] (%(default)g)"
-    )
+    declare_robot(solve)
+    declare_command(solve, degrees="--alpha is in degrees; text output shows degrees too")
     solve.add_argument(
         "--fidelity",
         choices=("auto", "torsionless", "torsion", "full"),
@@ -134,17 +119,11 @@ def _declare_solve(subcommands: argparse._SubParsersAction[Parser]) -> None:
         help="poses along the backbone, in --json (%(default)s)",
     )
     solve.add_argument("--json", action="store_true", help="print the answer as JSON, in SI units")
-    declare_loads(solve)
     solve.set_defaults(run=_solve)
 
 
 def _solve(arguments: argparse.Namespace) -> int:
-    robot = load_robot(arguments.robot)
-    angles = [math.radians(angle) for angle in arguments.alpha] if arguments.degrees else arguments.alpha
-    alpha, D = robot.check_command(angles, arguments.D)
-    loads = loads_in(arguments, robot)
-    if loads is not None:
-        check_loads(robot, D, loads)
+    robot, alpha, D, loads = command_in(arguments)
 
     from ctr_pvs.tasks.solver import EquilibriumSolver
 
@@ -162,15 +141,7 @@ def _solve(arguments: argparse.Namespace) -> int:
         print(answer_as_json(robot, equilibrium, arguments.poses, hints))
     else:
         print(answer_as_text(robot, equilibrium, arguments.degrees))
-    return _exit_code(equilibrium)
-
-
-def _exit_code(equilibrium: Equilibrium) -> int:
-    if equilibrium.success:
-        return SUCCESS
-    if equilibrium.status is Status.NO_STABLE_EQUILIBRIUM:
-        return NO_STABLE_EQUILIBRIUM
-    return NO_ANSWER_IN_TIME_OR_TOLERANCE
+    return exit_code(equilibrium)
 
 
 def _declare_reproduce(subcommands: argparse._SubParsersAction[Parser]) -> None:

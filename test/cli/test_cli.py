@@ -16,6 +16,7 @@ from ctr_pvs import EquilibriumSolver
 from ctr_pvs import Status
 from ctr_pvs import load_robot
 from ctr_pvs.cli import main as cli
+from ctr_pvs.cli.command import NO_STABLE_EQUILIBRIUM
 
 ROOT = Path(__file__).parents[2]
 ROBOT = str(ROOT / "config" / "renda2021.yaml")
@@ -165,7 +166,7 @@ UNSTABLE = [ROBOT, "--alpha", "0", "200", *FIG4, "--degrees", "--fidelity", "tor
 
 
 def test_without_equilibrium_the_json_says_no_and_leaves_the_rest_null(capsys):
-    answer = strict(solve(capsys, *UNSTABLE, "--json", code=cli.NO_STABLE_EQUILIBRIUM))
+    answer = strict(solve(capsys, *UNSTABLE, "--json", code=NO_STABLE_EQUILIBRIUM))
     assert list(answer) == KEYS
     assert (answer["success"], answer["status"]) == (False, "no_stable_equilibrium")
     assert answer["message"]
@@ -174,7 +175,7 @@ def test_without_equilibrium_the_json_says_no_and_leaves_the_rest_null(capsys):
 
 
 def test_without_equilibrium_the_text_is_one_line_without_numbers_to_trust(capsys):
-    text = solve(capsys, *UNSTABLE, code=cli.NO_STABLE_EQUILIBRIUM)
+    text = solve(capsys, *UNSTABLE, code=NO_STABLE_EQUILIBRIUM)
     assert text.startswith("renda2021: no_stable_equilibrium: ")
     assert len(text.splitlines()) == 1
 

@@ -1,4 +1,4 @@
-"""What has been compiled is kept, found again and switched to, or not: one rule a test, on a toy, in processes apart."""
+"""What is compiled is kept, found again and switched to, or not: one rule a test, on a toy, in other processes."""
 
 from __future__ import annotations
 

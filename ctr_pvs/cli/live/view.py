@@ -8,8 +8,8 @@ import threading
 from typing import TYPE_CHECKING
 from typing import Any
 
-from ctr_pvs.cli.seeing.words import SUCCESS
-from ctr_pvs.cli.seeing.words import declare_robot
+from ctr_pvs.cli.command import SUCCESS
+from ctr_pvs.cli.command import declare_robot
 from ctr_pvs.cli.words import UsageError
 from ctr_pvs.cli.words import number
 from ctr_pvs.cli.words import whole_number

@@ -5,11 +5,11 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from ctr_pvs.cli.command import declare_command
+from ctr_pvs.cli.command import declare_robot
+from ctr_pvs.cli.command import exit_code
 from ctr_pvs.cli.seeing.words import cannot_write
-from ctr_pvs.cli.seeing.words import declare_command
 from ctr_pvs.cli.seeing.words import declare_output
-from ctr_pvs.cli.seeing.words import declare_robot
-from ctr_pvs.cli.seeing.words import exit_code
 from ctr_pvs.cli.seeing.words import solved
 from ctr_pvs.cli.words import UsageError
 

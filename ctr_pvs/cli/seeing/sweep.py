@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ctr_pvs.cli.seeing.words import SUCCESS
+from ctr_pvs.cli.command import SUCCESS
+from ctr_pvs.cli.command import declare_robot
 from ctr_pvs.cli.seeing.words import cannot_write
 from ctr_pvs.cli.seeing.words import declare_output
-from ctr_pvs.cli.seeing.words import declare_robot
 from ctr_pvs.cli.words import UsageError
 from ctr_pvs.cli.words import number
 from ctr_pvs.robot.file import load_robot
