@@ -49,6 +49,7 @@ OUTPUTS = {
 COMMANDS_IN = QoSProfile(depth=1000)
 ANSWERS = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 REPLY_TIMEOUT = 10.0  # s
+OPTIONAL_OUTPUTS = 0.5  # s; backbone_s may be there or not, so it has a while to be found, and is not waited for
 
 Bag = list[tuple[str, bytes]]  # topic without namespace, serialised message; in the order of receipt
 
@@ -154,6 +155,13 @@ class Player:
             rclpy.spin_once(self._ros, timeout_sec=0.1)
 
 
+def spin_for(ros: Node, seconds: float) -> None:
+    """Handle messages for a while."""
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        rclpy.spin_once(ros, timeout_sec=0.1)
+
+
 def record(ros: Node, path: Path, answers: int) -> int:
     """Record until so many answers have come (0: until Ctrl-C); returns the exit code."""
     recorder = Recorder(ros, path)
@@ -161,12 +169,11 @@ def record(ros: Node, path: Path, answers: int) -> int:
     try:
         while not recorder.complete:
             rclpy.spin_once(ros, timeout_sec=0.1)
+        spin_for(ros, OPTIONAL_OUTPUTS)
         print(f"recording to {path}", flush=True)
         while not answers or recorder.answers < answers:
             rclpy.spin_once(ros, timeout_sec=0.1)
-        deadline = time.monotonic() + 0.5  # what belongs to the last answer
-        while time.monotonic() < deadline:
-            rclpy.spin_once(ros, timeout_sec=0.1)
+        spin_for(ros, 0.5)  # what belongs to the last answer
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     finally:

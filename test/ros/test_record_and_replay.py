@@ -15,6 +15,8 @@ from ros.load import stamp_of
 
 pytest.importorskip("rosbags", reason="rosbags is not installed: nothing is recorded or replayed")
 
+pytestmark = pytest.mark.alone  # discovery takes its time on a busy machine
+
 EXAMPLE = Path(__file__).parents[2] / "examples" / "record_and_replay.py"
 JOINTS = ["outer_rotation", "outer_translation", "inner_rotation", "inner_translation"]
 ANSWERS = 40
