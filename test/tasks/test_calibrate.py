@@ -9,6 +9,10 @@ from calibration_scenes import FIT
 from calibration_scenes import ROBOT
 from calibration_scenes import measured
 
+from ctr_pvs import Robot
+from ctr_pvs import RobotError
+from ctr_pvs import Segment
+from ctr_pvs import Tube
 from ctr_pvs import load_robot
 from ctr_pvs.errors import FieldError
 from ctr_pvs.errors import TableError
@@ -188,6 +192,23 @@ def test_the_text_of_a_robot_is_the_robot(name, tmp_path):
     file, robot = tmp_path / "again.yaml", load_robot(name)
     file.write_text(robot_text(robot))
     assert load_robot(file) == robot
+
+
+def test_the_text_of_a_helix_is_the_helix(tmp_path):
+    """One whose curvature changes, too; what a file has no words for is refused, not left out."""
+    from ctr_pvs.tasks.calibration.robot_text import robot_text
+
+    def robot(*curvature):
+        return Robot("one", (Tube("a", (Segment(0.1, 0.05, 0.04, curvature, turn=20.0),)),))
+
+    file = tmp_path / "again.yaml"
+    for told in (robot(16.7), robot(16.7, -550.0), robot()):
+        file.write_text(robot_text(told))
+        assert load_robot(file).tubes[0].segments[0].pre_curvature(0.07) == told.tubes[0].segments[0].pre_curvature(
+            0.07
+        )
+    with pytest.raises(RobotError, match="real coefficients beside a turn"):
+        robot_text(robot(16.7 + 2.0j))
 
 
 def test_limits_are_of_commands_not_of_tubes():

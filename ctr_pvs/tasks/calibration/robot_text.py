@@ -7,13 +7,17 @@ from collections.abc import Sequence
 
 import yaml
 
+from ctr_pvs.errors import RobotError
 from ctr_pvs.robot.robot import Robot
 from ctr_pvs.robot.robot import Segment
 from ctr_pvs.robot.robot import Tube
 
 
 def robot_text(robot: Robot, comments: Sequence[str] = ()) -> str:
-    """YAML in SI units, every number to its last digit, with ``comments`` before it."""
+    """YAML in SI units, every number to its last digit, with ``comments`` before it.
+
+    Raises ``RobotError`` for a helix with complex coefficients, which a robot file cannot tell.
+    """
     lines = [f"# {line}".rstrip() for comment in comments for line in comment.splitlines()]
     lines += [f"name: {_scalar(robot.name)}", "tubes: # outermost first"]
     for tube in robot.tubes:
@@ -33,7 +37,11 @@ def _by_name(robot: Robot, values: Sequence[object]) -> list[str]:
 
 
 def _value(value: object) -> str:
-    return f"[{', '.join(map(_number, value))}]" if isinstance(value, tuple) else _number(value)
+    return _list(value) if isinstance(value, tuple) else _number(value)
+
+
+def _list(values: Sequence[object]) -> str:
+    return f"[{', '.join(map(_number, values))}]"
 
 
 def _number(value: object) -> str:
@@ -64,15 +72,17 @@ def _segment(tube: Tube, segment: Segment) -> str:
         "bending_stiffness": _number(segment.bending_stiffness),
         "torsional_stiffness": _number(segment.torsional_stiffness),
     }
-    if segment.turn and len(segment.curvature) == 1 and segment.curvature[0].imag == 0.0:
-        parts |= {"curvature": _number(segment.curvature[0].real), "turn": _number(segment.turn)}
+    if segment.turn and segment.curvature:
+        if any(c.imag for c in segment.curvature):
+            raise RobotError("curvature", segment.curvature, "real coefficients beside a turn, to be written in a file")
+        parts |= {"curvature": _list([c.real for c in segment.curvature]), "turn": _number(segment.turn)}
     elif segment.curvature:
         for key, numbers in (
             ("curvature_y", [c.real for c in segment.curvature]),
             ("curvature_z", [c.imag for c in segment.curvature]),
         ):
             if any(numbers):
-                parts[key] = f"[{', '.join(map(_number, numbers))}]"
+                parts[key] = _list(numbers)
     if segment.area is not None and tube.inner_diameter is not None:
         # Only the area counts, for weight: an outside that makes it around the tube's smallest bore.
         parts["inner_diameter"] = _number(tube.inner_diameter)
