@@ -59,11 +59,14 @@ class TipServo:
             RejectedPose: the answer has no rates.
         """
         from ctr_pvs.tasks.aim import Aim
+        from ctr_pvs.tasks.aim import tangent_of
         from ctr_pvs.tasks.descent import DAMPING
 
         now = time.monotonic()
         period, self._last = min(now - self._last, LONGEST_PERIOD), now
-        aim = Aim(goal.position, goal.tangent, goal.orientation, 1.0, 1.0, LEVER)
+        whole = goal.orientation if goal.whole else None
+        tangent = tangent_of(goal.orientation) if goal.orientation is not None and not goal.whole else None
+        aim = Aim(goal.position, tangent, whole, 1.0, 1.0, LEVER)
         try:
             off, rates = aim.residual(answer), aim.jacobian(answer) * self._bounds.scale
         except NoEquilibriumError as error:

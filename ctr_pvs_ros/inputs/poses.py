@@ -41,12 +41,12 @@ class RejectedPose(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class TipGoal:
-    """Where the tip should be: position (3,) [m], and its tangent (3,) or its whole orientation (4,) xyzw, if those
-    count."""
+    """Where the tip should be: position (3,) [m]; and its orientation (4,) xyzw, of which only the tangent counts, the
+    x axis, unless it is ``whole``. None: none of it does."""
 
     position: Array
-    tangent: Array | None = None
     orientation: Array | None = None
+    whole: bool = False
 
     def distance(self, answer: Equilibrium) -> float:
         """[m] from an answer's tip to the position."""
@@ -78,8 +78,4 @@ def read_pose(
     size = math.hypot(*orientation)
     if abs(size - 1.0) > ABOUT_ONE:
         raise RejectedPose(PoseReason.OUT_OF_LIMITS, f"orientation: expected a unit quaternion, got norm {size:g}")
-    x, y, z, w = quaternion = np.array(orientation) / size
-    if goal == "orientation":
-        return TipGoal(place, orientation=quaternion)
-    tangent = np.array([1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + z * w), 2.0 * (x * z - y * w)])
-    return TipGoal(place, tangent=tangent)
+    return TipGoal(place, np.array(orientation) / size, whole=goal == "orientation")

@@ -5,6 +5,7 @@ import time
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from ctr_pvs import EquilibriumSolver
 from ctr_pvs import NoEquilibriumError
@@ -40,11 +41,11 @@ def answer(seed_robot):
 
 def test_what_counts_of_a_pose():
     goal = read_pose("", PLACE, (math.nan,) * 4, "base", "position")
-    assert goal.position.tolist() == list(PLACE) and goal.tangent is None and goal.orientation is None
+    assert goal.position.tolist() == list(PLACE) and goal.orientation is None
     goal = read_pose("base", PLACE, TURNED, "base", "tangent")
-    assert goal.tangent == pytest.approx([math.cos(0.6), math.sin(0.6), 0.0]) and goal.orientation is None
+    assert goal.orientation == pytest.approx(TURNED) and not goal.whole
     goal = read_pose("base", PLACE, TURNED, "base", "orientation")
-    assert goal.orientation == pytest.approx(TURNED) and goal.tangent is None
+    assert goal.orientation == pytest.approx(TURNED) and goal.whole
 
 
 @pytest.mark.parametrize(
@@ -71,6 +72,24 @@ def test_a_step_leads_there(seed_robot, answer, try_out):
     for way in np.eye(3):
         goal = read_pose("", tuple(answer.tip.position + 1e-4 * way), TURNED, "base", "position")
         assert goal.distance(servo.step(answer, goal, try_out).equilibrium) < 1e-6
+
+
+def test_a_tangent_is_the_x_axis_and_draws_near(seed_robot, answer, try_out):
+    """Another roll is no other goal; another tangent is."""
+    x, y, z, w = answer.tip.orientation
+
+    rolled = Rotation.from_quat([x, y, z, w]) * Rotation.from_rotvec([0.3, 0.0, 0.0])  # about its own x axis
+    servo = TipServo(seed_robot, 0.0, 0.0)
+    at = read_pose("", tuple(answer.tip.position), tuple(rolled.as_quat()), "base", "tangent")
+    assert joints(servo.step(answer, at, try_out))[0] == pytest.approx(answer.alpha, abs=1e-8)
+    bent = Rotation.from_rotvec([0.0, 0.02, 0.0]) * Rotation.from_quat([x, y, z, w])
+    goal = read_pose("", tuple(answer.tip.position), tuple(bent.as_quat()), "base", "tangent")
+    there = servo.step(answer, goal, try_out).equilibrium
+
+    def off(tip):
+        return np.linalg.norm(Rotation.from_quat(tip.orientation).apply([1.0, 0.0, 0.0]) - bent.apply([1.0, 0.0, 0.0]))
+
+    assert off(there.tip) < off(answer.tip)
 
 
 @pytest.mark.parametrize("goal", GOALS)
