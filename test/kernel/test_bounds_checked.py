@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from toy_fixtures import toy
+from toy_kernel import Toy
 from toy_kernel import needs_numba
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -19,8 +19,9 @@ LIMIT = 3600.0  # s
 
 
 @needs_numba
-def test_an_index_beside_its_array_is_an_error_where_bounds_are_checked(toy):
+def test_an_index_beside_its_array_is_an_error_where_bounds_are_checked(tmp_path):
     """What the long test below relies on."""
+    toy = Toy(tmp_path)
     toy.compile(**CHECKED)
     program = """
 assert compiler.mode() == "compiled"
