@@ -89,6 +89,10 @@ class Engine:
         self._local = threading.local()
         self._relaxed_gain: tuple[bytes, float] | None = None
 
+    def __reduce__(self) -> tuple[type[Engine], tuple[Robot, float]]:
+        """Made anew where it is unpickled: a workspace belongs to a thread."""
+        return type(self), (self.robot, self.tolerance)
+
     @property
     def workspace(self) -> Workspace:
         """That of the calling thread."""
