@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 #: The first stretch of the path that is tried in one [m], and the shortest, as a share of the tolerance.
 STRETCH, SHORTEST = 2e-3, 0.05
 #: Steps of a descent from one place of the path to the next; the tip meets a place to this share of the tolerance.
-STEPS, SHARE = 12, 0.05
+STEPS, SHARE = 40, 0.05
 
 
 @dataclass(frozen=True, eq=False)
