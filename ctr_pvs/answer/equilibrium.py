@@ -243,7 +243,7 @@ class Equilibrium:
     @property
     def base_wrench(self) -> Wrench:
         """Force [N] and moment [N m] about the orifice that the part beyond it exerts there, base axes: n(0+), m(0+).
-        The guide's reaction is the negative, and |k(0+)|^2 sum K / 2 along +x on the robot more."""
+        The guide's reaction is the negative, and ``|k(0+)|^2 sum K / 2`` along +x on the robot more."""
         wrench = self._engine.base_wrench(self.state.vector)
         return Wrench(wrench[:3], wrench[3:])
 
