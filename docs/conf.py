@@ -26,6 +26,9 @@ autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_typehints_format = "short"
 autodoc_preserve_defaults = True
+# Told by the names that the sources use, not by what these stand for.
+ALIASES = ("Array", "ArrayLike", "Codes", "Guess", "Ints", "Mask", "Progress", "Range", "Start", "Vector")
+autodoc_type_aliases = {name: name for name in ALIASES}
 napoleon_numpy_docstring = False
 add_module_names = False
 python_use_unqualified_type_names = True
@@ -33,6 +36,7 @@ python_maximum_signature_line_length = 100
 # Types of others, which no page here describes, and our own that only fill signatures.
 nitpick_ignore_regex = [
     ("py:.*", r"(numpy|collections\.abc|os)\..*"),
+    ("py:class", "|".join(ALIASES)),
     ("py:class", r"ctr_pvs\.solve\.solver\.EquilibriumSolver"),  # what the solver of the page on it is derived from
 ]
 
@@ -42,3 +46,4 @@ html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_show_sourcelink = False
 html_copy_source = False
+html_show_copyright = False

@@ -13,6 +13,8 @@ from sphinx.application import Sphinx
 NAME = r"[A-Za-z_]\w*(?: \([^()]*\))?(?: \[[^\[\]]*\])?"
 ITEM = re.compile(rf"(?:^\s*|(?<=[.;])\s+)({NAME}(?:, {NAME})*) : ")
 
+ALIAS = re.compile(r"[~\w.]*TypeAliasForwardRef\('(\w+)'\)")
+
 
 def listed(paragraph: list[str]) -> list[str]:
     """The lines of a paragraph that begins with an item, as a list; others as they are."""
@@ -40,8 +42,9 @@ def rewrite(app: Sphinx, what: str, name: str, thing: object, options: object, l
 def sign(
     app: Sphinx, what: str, name: str, thing: object, options: object, signature: str | None, returned: str | None
 ) -> tuple[str | None, str | None]:
-    """Defaults that are made anew each time have no expression that Sphinx could read."""
-    return signature and signature.replace("<factory>", "..."), returned
+    """Without what is no Python: defaults that are made anew each time, and aliases of types within unions."""
+    plain = [text and ALIAS.sub(r"\1", text.replace("<factory>", "...")) for text in (signature, returned)]
+    return plain[0], plain[1]
 
 
 def setup(app: Sphinx) -> dict[str, Any]:

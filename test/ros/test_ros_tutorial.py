@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import signal
 import subprocess
+import time
 
 import pytest
 import tutorial
@@ -12,7 +13,8 @@ import tutorial
 from ctr_pvs.kernel.compiler import mode
 
 PAGE = "tutorials/ros.md"
-STOP_TIMEOUT = 10.0  # s
+SERVING = "serving robot 'renda2021'"  # the reader waits for it, and so does the test
+START_TIMEOUT, STOP_TIMEOUT = 60.0, 10.0  # s
 
 
 class Terminals:
@@ -24,9 +26,14 @@ class Terminals:
     def shell(self, block, folder):
         if not block.code.startswith("equilibrium_node "):
             return tutorial.run_shell(block, folder)
-        with (folder / "log.txt").open("wb") as log:
+        log = folder / "log.txt"
+        with log.open("wb") as output:
             command = ["bash", "-c", f"exec {block.code}"]
-            self.nodes.append(subprocess.Popen(command, cwd=folder, stdout=log, stderr=subprocess.STDOUT))
+            self.nodes.append(subprocess.Popen(command, cwd=folder, stdout=output, stderr=subprocess.STDOUT))
+        end = time.monotonic() + START_TIMEOUT
+        while SERVING not in log.read_text(encoding="utf-8"):
+            assert time.monotonic() < end, log.read_text(encoding="utf-8")
+            time.sleep(0.1)
         return ""
 
     def stop(self):
