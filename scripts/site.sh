@@ -9,7 +9,11 @@ key="$(sha256sum <docs/requirements.txt) $PWD"
 if [ "$(cat "$VENV/made_from" 2>/dev/null)" != "$key" ]; then
   echo "site: installing Sphinx into $VENV (half a minute or so)"
   rm -rf "$VENV"
-  python3 -m venv "$VENV"
+  # The Python of the set-up, where there is one, is known to be able to make a venv.
+  for python in .venv/bin/python3 .venv-sourced/bin/python3 python3; do
+    [ ! -x "$python" ] || break
+  done
+  "$python" -m venv "$VENV"
   "$VENV/bin/python3" -m pip install --quiet --no-input --disable-pip-version-check -r docs/requirements.txt
   echo "$key" >"$VENV/made_from"
 fi
