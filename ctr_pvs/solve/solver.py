@@ -228,25 +228,24 @@ class EquilibriumSolver:
         return self._travelled(self._last, legs, at, packed, deadline, "")
 
     def solve_batch(
-        self,
-        alpha: ArrayLike,
-        D: ArrayLike,
-        start: str = "cold",
-        progress: Progress | None = None,
-        *,
-        tip_force: ArrayLike | None = None,
-        tip_moment: ArrayLike | None = None,
-    ) -> Batch:
+        self, alpha: ArrayLike, D: ArrayLike, start: str = "cold", progress: Progress | None = None, *,
+        tip_force: ArrayLike | None = None, tip_moment: ArrayLike | None = None, complete: bool = False,
+        threads: int | None = None,
+    ) -> Batch:  # fmt: skip
         """Many commands at once: the answers of cold starts to the rows of ``alpha`` [rad] and ``D`` [m] (M, N), under
         ``tip_force`` [N] and ``tip_moment`` [N m], (M, 3) each or None.
 
         progress : called as progress(done, total) from time to time.  The warm start of ``solve`` stays as it is.
+        complete : margins and forces are worked out on the way; else whoever asks for them has every row solved again.
+        threads : None for one per processor.
 
         A row that the robot cannot take is told in the batch.  Raises ``CommandError`` for arrays that are no tables of
         real numbers with a column per tube, ``FieldError`` for a wrong option.
         """
         check_choice("start", start, ("cold",))
-        return solve_rows(self, self._engine, alpha, D, tip_force, tip_moment, self._level, progress)
+        return solve_rows(
+            self, self._engine, alpha, D, tip_force, tip_moment, self._level, progress, complete, threads
+        )  # fmt: skip
 
     def solve_alone(self, alpha: Array, D: Array, loads: Loads | None) -> Equilibrium:
         """A cold start that leaves the warm start as it is; for threads of a batch."""
