@@ -27,6 +27,7 @@ SUCCESS = 0
 BAD_INPUT = 2
 NO_STABLE_EQUILIBRIUM = 3
 NO_ANSWER_IN_TIME_OR_TOLERANCE = 4
+INTERRUPTED = 130  # as shells have it
 
 
 def declare_robot(parser: argparse.ArgumentParser) -> None:

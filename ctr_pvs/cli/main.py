@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 
 from ctr_pvs.cli.calibrate import declare_calibrate
 from ctr_pvs.cli.command import BAD_INPUT
+from ctr_pvs.cli.command import INTERRUPTED
 from ctr_pvs.cli.command import SUCCESS
 from ctr_pvs.cli.command import command_in
 from ctr_pvs.cli.command import declare_command
@@ -78,6 +79,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except (UsageError, FieldError, RobotFileError) as error:
         print("ctr-pvs:", " ".join(str(error).splitlines()), file=sys.stderr)
         return BAD_INPUT
+    except KeyboardInterrupt:
+        print("ctr-pvs: stopped", file=sys.stderr)
+        return INTERRUPTED
     except BrokenPipeError:  # whoever read the answer has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return SUCCESS

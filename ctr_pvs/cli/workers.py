@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import hashlib
+import logging
 import os
 import pickle
 import re
@@ -76,7 +77,8 @@ def executor(scheduler: str | None) -> Iterator[Executor]:
         with _Cluster(client, scheduler) as cluster:
             yield cluster
     finally:
-        client.close(timeout=LOOK)
+        with suppress(OSError, TimeoutError):
+            client.close(timeout=LOOK)
 
 
 def _client(address: str) -> Client:
@@ -85,6 +87,7 @@ def _client(address: str) -> Client:
         from distributed import Client
     except ImportError:
         raise UsageError("--scheduler needs Dask (pip install 'ctr_pvs[cluster]')") from None
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # pages on what is told here in one line
     try:
         client = Client(address, timeout=CONNECT, set_as_default=False)
     except (OSError, ValueError) as error:
@@ -124,10 +127,9 @@ class _Cluster(Executor):
         # By a function of the standard library: the scheduler looks into what it passes on, and need not have ctr_pvs;
         # a worker that lacks it can say so, where it would end of a task that it cannot read.
         call = pickle.dumps(_Call(self._expected, fn, args, kwargs))
-        inside: Future[Any] = self._tasks.submit(pickle.loads, call)
         self._under_way.add(outside)
 
-        def pass_on(_: Future[Any]) -> None:
+        def pass_on(inside: Future[Any]) -> None:
             self._under_way.discard(outside)
             with suppress(InvalidStateError):  # given up meanwhile
                 try:
@@ -135,7 +137,7 @@ class _Cluster(Executor):
                 except Exception as error:
                     outside.set_exception(self._explained(error))
 
-        inside.add_done_callback(pass_on)
+        self._tasks.submit(pickle.loads, call).add_done_callback(pass_on)
         return outside
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:

@@ -7,6 +7,7 @@ import os
 import shutil
 import signal
 import sys
+import threading
 import time
 from collections.abc import Iterator
 
@@ -66,7 +67,7 @@ def run(capsys, command: str, *words: object, code: int = 0) -> str:
     """Standard output, or the lines on standard error where it is to fail."""
     assert cli.main([command, ROBOT, *map(str, words)]) == code
     captured = capsys.readouterr()
-    assert "Traceback" not in captured.err
+    assert "Traceback" not in captured.err and "distributed" not in captured.err
     return captured.err if code == 2 else captured.out
 
 
@@ -161,6 +162,14 @@ def test_a_scheduler_without_workers(capsys, tmp_path, monkeypatch, idle):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_ctrl_c_while_waiting_for_workers(capsys, tmp_path, idle):
+    timer = threading.Timer(3.0, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    run(capsys, "sweep", *GRID, "--output", tmp_path / "t.csv", "--scheduler", idle.address, code=130)
+    timer.join()
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_worker_without_the_package_or_with_another(capsys, tmp_path, idle):
     """What stands for an environment without it is found first, should one be installed, too."""
     words = ["--output", tmp_path / "t.csv", "--scheduler", idle.address]
@@ -193,7 +202,7 @@ def test_a_worker_with_other_sources(capsys, tmp_path, idle):
 
 @pytest.mark.skipif(compiler.mode() == "interpreted", reason="nothing is compiled here")
 def test_a_worker_that_interprets_kernels(capsys, tmp_path, idle):
-    """Its rows would have other last digits, and come a hundred times later."""
+    """Its rows would have other last digits, and come far later."""
     idle.start_worker(NUMBA_DISABLE_JIT="1")
     idle.wait_for_workers(1)
     words = ["--output", tmp_path / "t.csv", "--scheduler", idle.address]
@@ -221,6 +230,7 @@ def test_words(capsys, tmp_path, monkeypatch):
     assert said == "ctr-pvs: --scheduler needs Dask (pip install 'ctr_pvs[cluster]')\n"
 
 
+@pytest.mark.soak
 def test_a_scheduler_that_ends_in_the_middle(capsys, tmp_path, monkeypatch, tmp_path_factory):
     cluster = DaskProcesses(tmp_path_factory.mktemp("ending"))
     try:

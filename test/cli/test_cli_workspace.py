@@ -67,6 +67,27 @@ def test_failures_are_told_by_reason_and_left_out_of_the_rest():
     assert summary("robot", nothing, 1, 0, None) == ["robot: 1 random commands, seed 0: 1 rejected"]
 
 
+@pytest.mark.parametrize("ending", ["csv", "npz"])
+def test_resume_tells_what_one_run_tells(capsys, tmp_path, monkeypatch, ending):
+    whole, path = tmp_path / f"whole.{ending}", tmp_path / f"parts.{ending}"
+    words, plain = ["--count", "90", "--seed", "2"], Listed.rows
+    told = workspace(capsys, *words, "--output", whole)
+
+    def interrupted(commands, start, stop):
+        os.kill(os.getpid(), signal.SIGINT)
+        return plain(commands, start, min(stop, start + 20))
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Listed, "rows", interrupted)
+        assert "20 random commands of 90, stopped" in workspace(capsys, *words, "--output", path, code=130)
+    assert workspace(capsys, *words, "--output", path, "--resume") == told.replace(str(whole), str(path))
+    assert path.suffix != ".csv" or path.read_bytes() == whole.read_bytes()
+    assert workspace(capsys, *words, "--output", path, "--resume") == told.replace(str(whole), str(path))
+    assert "is there already" in workspace(capsys, *words, "--output", path, code=2)
+    assert "holds other commands" in workspace(capsys, *words[:3], "3", "--output", path, "--resume", code=2)
+    assert "expected --output" in workspace(capsys, *words, "--resume", code=2)
+
+
 def test_ctrl_c_ends_with_what_is_done(capsys, tmp_path, monkeypatch):
     plain = Listed.rows
 

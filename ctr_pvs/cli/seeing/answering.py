@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ctr_pvs.cli.command import INTERRUPTED
 from ctr_pvs.cli.command import SUCCESS
 from ctr_pvs.cli.seeing.progress import Progress
 from ctr_pvs.cli.seeing.progress import Stop
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
     from ctr_pvs.tasks.sweep import Commands
     from ctr_pvs.tasks.sweep import Rows
 
-INTERRUPTED = 130  # as shells have it
 #: How far a row that is solved again may be from what is kept, as a share of its largest number.
 SAME = 1e-6
 
