@@ -64,6 +64,13 @@ def answered(status: EquilibriumStatus) -> bool:
     return outcome_of(status) in ANSWERED
 
 
+def status_in_words(status: EquilibriumStatus) -> str:
+    """What became of a command, without its numbers."""
+    said = status.message.startswith(f"{status.reason}: ")
+    parts = [status.message if said else f"{status.reason}: {status.message}", status.hint]
+    return f"{outcome_of(status)}: {'; '.join(part for part in parts if part)}"
+
+
 def status_as_text(
     status: EquilibriumStatus, tip: PoseStamped | None, joints: JointState | None, degrees: bool = False
 ) -> str:

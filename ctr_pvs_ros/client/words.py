@@ -6,6 +6,7 @@ import argparse
 import math
 from collections.abc import Sequence
 
+from ctr_pvs.cli.live.view import declare_page
 from ctr_pvs.cli.version import declare_version
 from ctr_pvs.cli.words import Parser
 from ctr_pvs.cli.words import number
@@ -22,10 +23,10 @@ Joint = tuple[str, float]
 def parse(words: Sequence[str]) -> argparse.Namespace:
     """The words after the program's name; raises ctr_pvs.cli's UsageError.
 
-    The result has `command`, which is send, watch or solve, and what that takes; `joints` are in rad and m.
+    The result has `command`, which is send, watch, view or solve, and what that takes; `joints` are in rad and m.
     """
     arguments = _parser().parse_args(shielded(_joints_first(words)))
-    if arguments.command != "watch" and arguments.degrees:
+    if "joints" in arguments and arguments.degrees:
         arguments.joints = [_in_radians(joint) for joint in arguments.joints]
     arguments.namespace = arguments.namespace.strip("/")
     return arguments
@@ -64,9 +65,13 @@ def _parser() -> Parser:
     subcommands = parser.add_subparsers(metavar="SUBCOMMAND", required=True, dest="command")
     send = _declared(subcommands, "send", "one command on servo_jp, and what the node says of it")
     watch = _declared(subcommands, "watch", "a line for each command or wrench as the node tells of it, until Ctrl-C")
+    view = _declared(subcommands, "view", "the tubes as the node moves them, on a page in a browser, until Ctrl-C")
     solve = _declared(subcommands, "solve", "one equilibrium from ~/solve, beside the stream of commands")
     for subcommand in (send, solve):
         _declare_joints(subcommand)
+    for subcommand in (send, watch, solve):
+        subcommand.add_argument("--json", action="store_true", help="one JSON object a line; SI units, null: not known")
+    declare_page(view, "that has the longest arrow")
     watch.add_argument("--count", type=whole_number(1, 10**9), metavar="N", help="end after so many lines")
     solve.add_argument("--warm", action="store_true", help="set out from the service's last answer, not from rest")
     for kind, letter, unit in (("force", "F", "N"), ("moment", "M", "N m")):
@@ -81,7 +86,6 @@ def _declared(subcommands: argparse._SubParsersAction[Parser], name: str, text: 
     subcommand = subcommands.add_parser(name, allow_abbrev=False, help=text, description=f"{text}.", epilog=EXIT_CODES)
     subcommand.add_argument("--namespace", default="", metavar="NS", help="namespace of the node (none)")
     subcommand.add_argument("--node", default="ctr_equilibrium", metavar="NAME", help="name of the node (%(default)s)")
-    subcommand.add_argument("--json", action="store_true", help="one JSON object a line; SI units, null: not known")
     return subcommand
 
 

@@ -21,6 +21,7 @@ from ctr_pvs.cli import main as cli
 from ctr_pvs.cli.live.mesh import RING
 from ctr_pvs.cli.live.mesh import tube_faces
 from ctr_pvs.cli.live.mesh import tube_vertices
+from ctr_pvs.cli.live.readout import snap_is_near
 from ctr_pvs.cli.live.state import LiveRobot
 from ctr_pvs.cli.live.view import served
 
@@ -80,9 +81,9 @@ def test_a_snap_is_announced_and_told():
     robot = live(SEED)
     for angle in (1.0, 3.0, 4.8):
         shown = robot.move([0.0, angle], [0.0935, 0.2085], np.zeros(3))
-    assert shown.good and shown.snap_is_near and shown.reserve < 0.2
+    assert shown.good and snap_is_near(shown.margin, shown.reserve) and shown.reserve < 0.2
     shown = robot.move([0.0, 5.5], [0.0935, 0.2085], np.zeros(3))
-    assert shown.message.startswith("SNAP on the way") and not shown.snap_is_near
+    assert shown.message.startswith("SNAP on the way") and not snap_is_near(shown.margin, shown.reserve)
     shown = robot.reset()
     assert shown.alpha.tolist() == [0.0, 0.0] and len(robot.trace) == 1 and "SNAP" not in shown.message
 
@@ -119,7 +120,7 @@ def page():
     pytest.importorskip("viser")
     page = served(load_robot(ROBOT), 1e-5, "127.0.0.1", free_port(), 1.0)
     yield page
-    page.server.stop()
+    page.stop()
 
 
 @pytest.mark.filterwarnings("default")
@@ -131,27 +132,28 @@ def test_the_page_is_served_and_needs_no_other_server(page):
 
 @pytest.mark.filterwarnings("default")
 def test_a_slider_moves_the_tip(page):
-    before = [mesh.vertices.copy() for mesh in page.tubes]
+    before = {name: mesh.vertices.copy() for name, mesh in page.scene.tubes.items()}
     page.alpha[2].value = 90.0  # assigning runs the handlers, as a browser does
     assert page.live.shown.alpha[2] == pytest.approx(np.pi / 2.0)
-    assert np.abs(page.tubes[2].vertices - before[2]).max() > 0.05  # 5 mm
+    assert np.abs(page.scene.tubes["inner"].vertices - before["inner"]).max() > 0.05  # 5 mm
     tip = 10.0 * page.live.shown.tip.position
-    assert page.tip.position == pytest.approx(tip) and page.tubes[2].vertices[-1] == pytest.approx(tip, abs=1e-5)
-    assert page.trace.points.shape == (1, 2, 3)
+    assert page.scene.tip.position == pytest.approx(tip)
+    assert page.scene.tubes["inner"].vertices[-1] == pytest.approx(tip, abs=1e-5)
+    assert page.scene.trace.points.shape == (1, 2, 3)
     page.force[1].value = 0.5
     assert page.live.shown.tip_force.tolist() == [0.0, 0.5, 0.0]
-    assert np.linalg.norm(page.arrow.points[0, 1] - page.arrow.points[0, 0]) > 0.1
-    assert "stability margin" in page.margin_told.content and page.margin.value > 50.0
-    assert page.table.content.count("\n| ") == 5  # a head, a line under it, three tubes
+    assert np.linalg.norm(page.scene.arrow.points[0, 1] - page.scene.arrow.points[0, 0]) > 0.1
+    assert "stability margin" in page.readout.margin_told.content and page.readout.margin.value > 50.0
+    assert page.readout.table.content.count("\n| ") == 5  # a head, a line under it, three tubes
 
 
 @pytest.mark.filterwarnings("default")
 def test_sliders_out_of_order_are_put_where_the_robot_is(page):
     page.D[0].value = 140.0
     assert [slider.value for slider in page.D] == pytest.approx([140.0, 140.0, 160.0])
-    assert "D[1]" in page.message.content
+    assert "D[1]" in page.readout.message.content
     page.D[2].value = 300.0  # all of the inner tube is behind the orifice
-    assert page.tubes[2].visible is False and page.tubes[1].visible is True
+    assert page.scene.tubes["inner"].visible is False and page.scene.tubes["middle"].visible is True
 
 
 @pytest.mark.filterwarnings("default")
@@ -163,7 +165,7 @@ def test_reset_clear_and_save(page):
     assert sent[0][0] == "three_tubes_command.yaml"
     assert yaml.safe_load(sent[0][1])["alpha"] == page.live.shown.alpha.tolist()
     page._clear(None)
-    assert len(page.trace.points) == 0
+    assert len(page.scene.trace.points) == 0
     page._reset(None)
     assert page.alpha[0].value == 0.0 and page.live.shown.alpha.tolist() == [0.0, 0.0, 0.0]
 
