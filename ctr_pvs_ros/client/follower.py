@@ -53,6 +53,7 @@ class Follower(Client):
         self._heard_at = time.monotonic()
         self._markers: MarkerArray | None = None  # not drawn yet
         self._looks = 0
+        self._due, self._silence = time.monotonic(), 0
         self._outcome: EquilibriumStatus | None = None  # not told yet
         self._kept: dict[type, Kept] = {PoseStamped: {}, JointState: {}, EquilibriumStatus: {}}
         node.create_subscription(MarkerArray, "markers", self._on_markers, LATCHED)
@@ -63,28 +64,32 @@ class Follower(Client):
 
     def show_on(self, page: FollowedPage) -> None:
         """Keeps the page up to date, until it is interrupted."""
-        due, told = time.monotonic(), 0
         while True:
-            self._executor.spin_once(timeout_sec=PERIOD)
-            now = time.monotonic()
-            if now < due:
-                continue
-            due = now + PERIOD
-            if self._outcome is not None:
-                page.outcome(status_in_words(self._outcome), answered(self._outcome))
-                self._outcome = None
-            self._draw(page)
-            quiet = now - self._heard_at
-            silence = int(quiet) if quiet >= SILENCE else 0
-            if silence != told:
-                told = silence
-                page.silent(silence or None)
+            self.look(page)
+
+    def look(self, page: FollowedPage) -> None:
+        """Handles what has come, and shows it where it is time to."""
+        self._executor.spin_once(timeout_sec=PERIOD)
+        now = time.monotonic()
+        if now < self._due:
+            return
+        self._due = now + PERIOD
+        if self._outcome is not None:
+            page.outcome(status_in_words(self._outcome), answered(self._outcome))
+            self._outcome = None
+        self._draw(page)
+        quiet = now - self._heard_at
+        silence = int(quiet) if quiet >= SILENCE else 0
+        if silence != self._silence:
+            self._silence = silence
+            page.silent(silence or None)
 
     def _on_markers(self, markers: MarkerArray) -> None:
         self._heard_at = time.monotonic()
         self._markers, self._looks = markers, 0
 
     def _on_status(self, status: EquilibriumStatus) -> None:
+        self._heard_at = time.monotonic()
         self._outcome = status
         if answered(status):
             self._keep(status)

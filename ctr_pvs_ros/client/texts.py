@@ -66,9 +66,9 @@ def answered(status: EquilibriumStatus) -> bool:
 
 def status_in_words(status: EquilibriumStatus) -> str:
     """What became of a command, without its numbers."""
-    said = status.message.startswith(f"{status.reason}: ")
-    parts = [status.message if said else f"{status.reason}: {status.message}", status.hint]
-    return f"{outcome_of(status)}: {'; '.join(part for part in parts if part)}"
+    outcome, message = outcome_of(status), status.message
+    said = status.reason == outcome or message.startswith(f"{status.reason}: ")
+    return f"{outcome}: {'' if said else f'{status.reason}: '}{message}{f'; {status.hint}' if status.hint else ''}"
 
 
 def status_as_text(

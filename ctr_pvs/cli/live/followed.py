@@ -86,9 +86,11 @@ class FollowedPage:
             self._tell()
 
     def wipe(self) -> None:
-        """Takes the tubes away."""
+        """Takes the tubes away: whoever moved them has ended."""
         with self._turns.mine():
             self.scene.hide()
+            self._outcome = f"{self.name} has ended", False
+            self._tell()
 
     def outcome(self, message: str, good: bool) -> None:
         """What became of the last command, answered or not."""

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ctr_pvs.cli.live.mesh import solids
+from ctr_pvs.cli.live.others import Ghost
 from ctr_pvs.cli.live.others import Others
 from ctr_pvs.cli.live.others import Question
 from ctr_pvs.cli.live.readout import MM
@@ -155,8 +156,8 @@ class Page:
             self.scene.tell("")
 
     def _show_frame(self, frame: Frame) -> None:
-        self.scene.show(solids(frame.tubes), frame.tip, flash=1.0 - frame.share)
         self.scene.tell(f"SNAP, {MM * frame.released:.3g} mJ released")
+        self.scene.show(solids(frame.tubes), frame.tip, flash=1.0 - frame.share)
 
     def _tell(self, shown: Shown) -> None:
         warning = "**A snap is near.** " if shown.good and snap_is_near(shown.margin, shown.reserve) else ""
@@ -207,15 +208,18 @@ class Page:
             if question is not self._question:
                 return  # the command has changed meanwhile
             ghosts = others.beside(self.live.shown.tubes, self.live.tolerance)
-            stable = sum(ghost.stable for ghost in ghosts)
-            drawn = ghosts[:MOST_GHOSTS]
             with self.server.atomic():
-                self.scene.show_ghosts((solids(ghost.tubes), ghost.stable) for ghost in drawn)
-                self.others_told.content = (
-                    f"{len(ghosts)} others, {stable} stable (green), {len(ghosts) - stable} unstable (purple)"
-                    + (f", the first {MOST_GHOSTS} shown" if len(ghosts) > len(drawn) else "")
-                    + f"; {others.told}"
-                )
+                self.scene.show_ghosts((solids(ghost.tubes), ghost.stable) for ghost in ghosts[:MOST_GHOSTS])
+                self.others_told.content = f"{_counted(ghosts)}; {others.told}"
+
+
+def _counted(ghosts: tuple[Ghost, ...]) -> str:
+    if not ghosts:
+        return "no other equilibrium"
+    stable = sum(ghost.stable for ghost in ghosts)
+    some = f", the first {MOST_GHOSTS} are shown" if len(ghosts) > MOST_GHOSTS else ""
+    count = "1 other" if len(ghosts) == 1 else f"{len(ghosts)} others"
+    return f"{count}, {stable} stable (green), {len(ghosts) - stable} unstable (purple){some}"
 
 
 def _slider(gui: Any, name: str, limits: Array, step: float) -> Any:
