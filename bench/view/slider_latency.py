@@ -2,12 +2,12 @@
 
     scripts/in_env.sh python3 -m bench.view.slider_latency
 
-The page of this process is shown in a Chromium without a display, whose WebGL draws in software.  A key is pressed on the
-slider of the inner tube's rotation, 0.5 deg at a time, and again a random while after the shape has followed.  *Slider to
-shape* runs, on the browser's clock, from the key event in the page to the first upload of a mesh of a tube's size to WebGL:
-the new shape is then part of the frame that is being drawn.  *Server* runs, on this process's clock, from the entry of the
-slider's handler to its return: the solve, the shapes and meshes, and all messages handed over to viser.  What is left is
-viser's, the browser's, and the frames' pace.  It needs viser and Chromium.
+The page of this process is shown in a Chromium without a display, whose WebGL draws in software.  A key is pressed on
+the slider of the inner tube's rotation, 0.5 deg at a time, and again a random while after the shape has followed.
+*Slider to shape* runs, on the browser's clock, from the key event in the page to the first upload of a mesh of a tube's
+size to WebGL: the new shape is then part of the frame that is being drawn.  *Server* runs, on this process's clock,
+from the entry of the slider's handler to its return: the solve, the shapes and meshes, and all messages handed over to
+viser.  What is left is viser's, the browser's, and the frames' pace.  It needs viser and Chromium.
 """
 
 from __future__ import annotations

@@ -88,11 +88,11 @@ class Page:
 
     def _build_buttons(self) -> None:
         gui = self.server.gui
-        self.others = gui.add_checkbox("other equilibria", False)
-        self.others_told = gui.add_markdown("", visible=False)
         self.save = gui.add_button("Save the command")
         self.clear = gui.add_button("Clear the trace")
         self.reset = gui.add_button("Reset")
+        self.others = gui.add_checkbox("other equilibria", False)
+        self.others_told = gui.add_markdown("", visible=False)
         self.others.on_update(self._others_wanted)
         self.save.on_click(self._save)
         self.clear.on_click(self._clear)
