@@ -7,7 +7,7 @@ the slider of the inner tube's rotation, 0.5 deg at a time, and again a random w
 *Slider to shape* runs, on the browser's clock, from the key event in the page to the first upload of a mesh of a tube's
 size to WebGL: the new shape is then part of the frame that is being drawn.  *Server* runs, on this process's clock,
 from the entry of the slider's handler to its return: the solve, the shapes and meshes, and all messages handed over to
-viser.  What is left is viser's, the browser's, and the frames' pace.  It needs viser and Chromium.
+viser.  What is left is viser's, the browser's, and the pace of its frames, *frame* apart.  It needs viser and Chromium.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import platform
 import socket
 import time
 from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 import viser
@@ -38,7 +39,7 @@ from ctr_pvs.robot.file import load_robot
 
 DOCUMENT = DOCS / "seeing.md"
 ROBOTS = ("renda2021", "three_tubes")
-PRESSES = 300
+PRESSES = 150
 #: First presses, which find everything cold.
 WARMING = 10
 #: Random pause between a shape and the next press [s].
@@ -48,7 +49,9 @@ FLOATS = 3 * (RING * POSES + 2)
 #: Notes when a key goes down, and when the first mesh of that size is uploaded after it.
 WATCH = """
 (() => {
-  window.latency = { pressed: null, times: [], uploads: 0 };
+  window.latency = { pressed: null, times: [], uploads: 0, frames: [] };
+  const frame = () => { latency.frames.push(performance.now()); requestAnimationFrame(frame); };
+  requestAnimationFrame(frame);
   window.addEventListener("keydown", () => { latency.pressed = performance.now(); }, true);
   for (const name of ["bufferData", "bufferSubData"]) {
     const plain = WebGL2RenderingContext.prototype[name];
@@ -80,8 +83,16 @@ class TimedPage(Page):
         self.times.append(time.perf_counter() - begin)
 
 
-def measure(robot: str, presses: int) -> tuple[np.ndarray, np.ndarray, list[str]]:
-    """Slider to shape (n,) and server (n,) [s], and what the browser complained of."""
+class Measured(NamedTuple):
+    """Slider to shape (n,), server (n,) and between frames (f,) [s], and what the browser complained of."""
+
+    seen: np.ndarray
+    served: np.ndarray
+    frames: np.ndarray
+    complaints: list[str]
+
+
+def measure(robot: str, presses: int) -> Measured:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
@@ -94,11 +105,13 @@ def measure(robot: str, presses: int) -> tuple[np.ndarray, np.ndarray, list[str]
             browser.until(lambda: "snap reserve" in browser.text and browser.run("latency.uploads") > 0)
             browser.run(f"document.querySelectorAll('[role=slider]')[{inner}].focus()")
             page.times.clear()
+            browser.run("latency.frames.length = 0")
             for count in range(presses):
                 browser.press("ArrowRight" if count % 100 < 50 else "ArrowLeft")
                 browser.until(lambda wanted=count + 1: browser.run("latency.times.length") >= wanted)
                 time.sleep(rng.uniform(*PAUSE))
-            return 1e-3 * np.array(browser.run("latency.times")), np.array(page.times), browser.complaints
+            seen, frames = (1e-3 * np.array(browser.run(f"latency.{name}")) for name in ("times", "frames"))
+            return Measured(seen, np.array(page.times), np.diff(frames), browser.complaints)
     finally:
         page.stop()
 
@@ -114,14 +127,15 @@ def main() -> None:
     document, presses = (None, 30) if options.quick else (DOCUMENT, PRESSES)
     rows = []
     for robot in ROBOTS:
-        seen, served, complaints = measure(robot, presses)
-        assert not complaints, complaints
-        rows.append([robot, *(told(times, percent) for times in (seen, served) for percent in (50, 99))])
+        run = measure(robot, presses)
+        assert not run.complaints, run.complaints
+        columns = (run.seen, 50), (run.seen, 99), (run.served, 50), (run.served, 99), (run.frames, 50)
+        rows.append([robot, *(told(times, percent) for times, percent in columns)])
     busy = f"{os.getloadavg()[0]:.1f} processes wanted the {os.cpu_count()} cores"
     versions = f"Python {platform.python_version()}, viser {viser.__version__}"
     machine = f"{platform.machine()}, {versions}; {presses} presses each; u = {1e6 * unit():.3f} µs; {busy}."
     publish("page machine", machine, document)
-    publish("page latency", table(["", "slider to shape p50", "p99", "server p50", "p99"], rows), document)
+    publish("page latency", table(["", "slider to shape p50", "p99", "server p50", "p99", "frame p50"], rows), document)
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from numpy.typing import NDArray
 
 from ctr_pvs.answer.backbone import Pose
+from ctr_pvs.cli.live.mesh import Ints
 from ctr_pvs.cli.live.mesh import Solid
 
 if TYPE_CHECKING:
@@ -48,6 +49,7 @@ class Scene:
     def _build(self) -> None:
         scene = self._server.scene
         scene.set_up_direction("+z")
+        scene.configure_default_lights(cast_shadow=False)
         size: dict[str, Any] = {"axes_length": UNITS * AXES, "axes_radius": UNITS * AXES / 25.0}
         scene.add_frame("/orifice", **size)
         self.tip = scene.add_frame("/tip", **size)
@@ -77,7 +79,7 @@ class Scene:
             vertices = UNITS * tube.vertices
             if mesh is None or mesh.vertices.shape != vertices.shape:
                 path = f"/tubes/{tube.name}"
-                self.tubes[tube.name] = self._server.scene.add_mesh_simple(path, vertices, tube.faces, color=colour)
+                self.tubes[tube.name] = self._mesh(path, vertices, tube.faces, color=colour)
                 continue
             mesh.vertices, mesh.visible = vertices, True
             if mesh.color != colour:
@@ -109,17 +111,21 @@ class Scene:
         for mesh in self.ghosts:
             mesh.remove()
         self.ghosts = [
-            self._server.scene.add_mesh_simple(
+            self._mesh(
                 f"/ghosts/{index}/{tube.name}",
                 UNITS * tube.vertices,
                 tube.faces,
                 color=STABLE if stable else UNSTABLE,
                 opacity=OPACITY,
-                cast_shadow=False,
             )
             for index, (tubes, stable) in enumerate(ghosts)
             for tube in tubes
         ]
+
+    def _mesh(self, path: str, vertices: Array, faces: Ints, **look: Any) -> Any:
+        """Without shadows: they take as long to draw as all the rest where the processor draws."""
+        scene = self._server.scene
+        return scene.add_mesh_simple(path, vertices, faces, cast_shadow=False, receive_shadow=False, **look)
 
 
 def mixed(colour: Colour, other: Colour, share: float) -> Colour:
