@@ -3,7 +3,7 @@ export ROBOT ?= config/renda2021.yaml
 IN_ENV := scripts/in_env.sh
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo run test soak bench lint clean
+.PHONY: help setup demo run test soak bench lint site clean
 
 help: ## show this list
 	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 15
@@ -22,8 +22,11 @@ lint: setup ## style, format and types
 	@$(IN_ENV) python3 -m ruff format --check .
 	@$(IN_ENV) python3 -m mypy
 
+site: ## the documentation as a site, every link checked: .site/index.html
+	@scripts/site.sh
+
 # Tests that keep time have the machine to themselves; the others share the processors.
-test: lint ## lint, solver tests and node tests
+test: lint site ## lint, the site, solver tests and node tests
 	@$(IN_ENV) python3 -m pytest -m "not soak and not alone" -n 2 --dist loadfile
 	@$(IN_ENV) python3 -m pytest -m "not soak and alone"
 
@@ -43,6 +46,6 @@ bench: setup ## speed against accuracy, measured here and charted: docs/speed_ac
 clean: ## remove everything that make has made, compiled kernels in the user's cache among it
 	@for venv in .venv .venv-sourced; do \
 		$$venv/bin/python3 -m ctr_pvs.kernel --remove 2>/dev/null | sed 's/^/rm -rf /' || true; done
-	rm -rf .venv .ws .venv-sourced .ws-sourced demo .mypy_cache .pytest_cache .ruff_cache
+	rm -rf .venv .ws .venv-sourced .ws-sourced .venv-site .site demo .mypy_cache .pytest_cache .ruff_cache
 	find bench ctr_pvs ctr_pvs_ros test -name __pycache__ -prune -exec rm -rf {} +
 	@echo "the next make sets up anew and compiles the kernels again, which takes some minutes"

@@ -32,5 +32,10 @@ setup(
     ],
     # Numba is not in package.xml: some releases of Ubuntu have no package of it, and the solver runs without, slower.
     install_requires=["numpy>=1.26", "scipy>=1.11", "pyyaml>=6", "numba>=0.59"],
-    extras_require={"test": ["pytest"], "plot": ["matplotlib>=3.8"], "view": ["viser>=1.0"]},
+    extras_require={
+        "test": ["pytest"],
+        "plot": ["matplotlib>=3.8"],
+        "view": ["viser>=1.0"],
+        "cluster": ["distributed>=2024.5"],
+    },
 )

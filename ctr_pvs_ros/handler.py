@@ -43,6 +43,7 @@ from ctr_pvs_ros.stream import Tried
 from ctr_pvs_ros.tip_servo import TipServo
 
 if TYPE_CHECKING:
+    from ctr_pvs import Equilibrium
     from ctr_pvs import EquilibriumSolver
 
 NAN = float("nan")
@@ -84,6 +85,11 @@ class Handler:
         self._outputs = outputs
         self._tip_servo: tuple[tuple[Robot, float, float], TipServo] | None = None
         self.report = Report(self._load if settings.use_external_wrench else None)
+
+    @property
+    def last_answer(self) -> Equilibrium | None:
+        """The last one that went out."""
+        return self._stream.answer
 
     def release(self) -> None:
         """Accept commands again after a snap under on_snap = stop."""
@@ -143,7 +149,7 @@ class Handler:
         """One step of the tip towards a pose, set out from the last answer."""
         stamp, age = self._stamp_for(message.header.stamp)
         self.report.received(age)
-        settings, last = self.settings, self._stream.answer
+        settings, last = self.settings, self.last_answer
         try:
             numbers = messages.numbers_of(message.pose)
             goal = read_pose(message.header.frame_id, *numbers, settings.frame_id, settings.servo_cp_goal)

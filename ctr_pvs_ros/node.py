@@ -36,6 +36,7 @@ from ctr_pvs_ros.inputs.subscriptions import Inputs
 from ctr_pvs_ros.outputs.publishers import Publishers
 from ctr_pvs_ros.parameters import ParameterError
 from ctr_pvs_ros.parameters import Settings
+from ctr_pvs_ros.service.inverse_service import InverseService
 from ctr_pvs_ros.service.jobs import SolverOptions
 from ctr_pvs_ros.service.jobs import robot_of
 from ctr_pvs_ros.service.service_process import ServiceProcess
@@ -79,8 +80,11 @@ class EquilibriumNode(Node):
         self._outputs = Publishers(self, self._robot, self._joints, settings)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 1)
         self._process = ServiceProcess(solver_options, self._on_service_trouble)
-        self._service = SolveService(self, self._process, reader, settings)
-        self.handler = Handler(self, reader, settings, solver, self._outputs)
+        self.handler = handler = Handler(self, reader, settings, solver, self._outputs)
+        self._asked = (
+            SolveService(self, self._process, reader, settings),
+            InverseService(self, self._process, reader, settings, lambda: handler.last_answer),
+        )
         self._tell_of_the_robot()
         if initial is not None:
             self._guarded(self.handler.start_with)(initial)
@@ -98,11 +102,12 @@ class EquilibriumNode(Node):
         self.get_logger().info(f"serving robot {self._robot.name!r} from {settings.robot_file}")
 
     def destroy_node(self) -> None:
-        """Also takes the markers away, and ends the processes of the service and the compiler."""
+        """Also takes the markers away, and ends the processes of the services and the compiler."""
         stopping = threading.Thread(target=self.compiling.stop)  # which takes its time, as do the others
         stopping.start()
         self._outputs.clear()
-        self._service.stop()
+        for service in self._asked:
+            service.stop()
         self._process.stop()
         stopping.join()
         self.compiling.wait(LOADING_TIME)
@@ -180,7 +185,8 @@ class EquilibriumNode(Node):
         # Diagnostics first: should an output fail here, they are what tells of it.
         if self._diagnostics_due is not None and time.monotonic() - self._diagnostics_due > CATCH_UP_PERIOD:
             self._publish_diagnostics()  # no command has come meanwhile
-        self._service.open_when_ready()
+        for service in self._asked:
+            service.open_when_ready()
         self._outputs.catch_up()
 
     def _look_round(self) -> None:
@@ -210,7 +216,7 @@ class EquilibriumNode(Node):
     def _after_set_parameters(self, changed: list[Parameter]) -> None:
         settings = self._settings = parameters.read(self)
         reader = self._new_reader(settings)
-        for part in (self.handler, self._service):
+        for part in (self.handler, *self._asked):
             part.reader, part.settings = reader, settings
         if any(parameter.name == "on_snap" for parameter in changed):
             self.handler.release()

@@ -28,7 +28,6 @@ LONGEST_PERIOD = 0.1
 LEAST_EFFECT = 1e-4
 #: Steps that lead no nearer are shortened, so often and by this; nearer than this [m] nothing need be done.
 TRIES, SHORTENED, THERE = 4, 0.3, 1e-12
-LEVER = 0.02  # m that a radian of the tip's rotation counts as
 
 
 class TipServo:
@@ -59,14 +58,11 @@ class TipServo:
             RejectedPose: the answer has no rates.
         """
         from ctr_pvs.tasks.aim import Aim
-        from ctr_pvs.tasks.aim import tangent_of
         from ctr_pvs.tasks.descent import DAMPING
 
         now = time.monotonic()
         period, self._last = min(now - self._last, LONGEST_PERIOD), now
-        whole = goal.orientation if goal.whole else None
-        tangent = tangent_of(goal.orientation) if goal.orientation is not None and not goal.whole else None
-        aim = Aim(goal.position, tangent, whole, 1.0, 1.0, LEVER)
+        aim = Aim(*goal.parts)
         try:
             off, rates = aim.residual(answer), aim.jacobian(answer) * self._bounds.scale
         except NoEquilibriumError as error:

@@ -107,7 +107,7 @@ def test_the_wheel_tells_what_it_is_and_holds_the_license(wheel):
     assert told["Version"] == ET.parse(ROOT / "package.xml").findtext("version")
     assert told["Description-Content-Type"] == "text/markdown"
     assert told.get_payload().strip() == (ROOT / "README.md").read_text(encoding="utf-8").strip()
-    assert set(told.get_all("Provides-Extra")) == {"plot", "test", "view"}
+    assert set(told.get_all("Provides-Extra")) == {"cluster", "plot", "test", "view"}
     assert licenses == [(ROOT / "LICENSE").read_bytes()]
 
 

@@ -67,6 +67,7 @@ def test_the_solver_and_its_tests_import_nothing_of_ros():
         "llvmlite",
         "pyarrow",  # where it is there: Parquet
         "viser",  # the live page
+        "distributed",  # clusters
         "ctr_pvs",
     }
     for path in (ROOT / "ctr_pvs").rglob("*.py"):

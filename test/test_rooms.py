@@ -129,6 +129,17 @@ def test_no_module_imports_the_node_or_ros(path):
     assert not tops & {"ctr_pvs_ros", "ctr_pvs_interfaces", "rclpy"}
 
 
+def test_one_module_knows_of_clusters():
+    """Tasks take any executor; who that is is settled at the command line."""
+    knowing = {
+        str(path.relative_to(PACKAGE))
+        for path in modules()
+        for name in imports(path.read_text(encoding="utf-8"))
+        if name.partition(".")[0] in ("dask", "distributed")
+    }
+    assert knowing == {"cli/workers.py"}
+
+
 @of([path for path in modules() if room_of(path) in PLAIN])
 def test_plain_rooms_do_without_scipy(path):
     assert not [name for name in imports(path.read_text(encoding="utf-8")) if name.partition(".")[0] == "scipy"]

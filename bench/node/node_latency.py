@@ -36,6 +36,8 @@ from ctr_pvs_ros.process import isolate
 DOCUMENT = DOCS / "node_latency.md"
 RATES = (200.0, 500.0)  # Hz
 COMMANDS = 2000
+#: Of poses: the last is more than the node can take.
+POSE_RATES = (200.0, 2000.0)
 #: First commands of a run, which find caches empty.
 WARMING = 50
 #: Most u from callback to last publish at the first of the rates: median and 99th percentile.
@@ -154,6 +156,15 @@ def nodes_table(count: int) -> str:
     return table(["", *HEAD, "of it solve", "publish"], rows)
 
 
+def poses_table(count: int) -> str:
+    rows = []
+    for rate in POSE_RATES:
+        run, measured, _ = measure("node", "events", rate, count, posing=True)
+        errors = [f"{1e6 * np.quantile(run.errors, share):.3g} µm" for share in (0.5, 0.99, 1.0)]
+        rows.append([f"{rate:.0f} Hz", *row(run, measured), *errors])
+    return table(["poses", *HEAD, "tip off p50", "p99", "most"], rows)
+
+
 def service_table(count: int) -> str:
     rows = []
     for busy, name in ((False, "service idle"), (True, "service always at work")):
@@ -175,6 +186,7 @@ def main() -> None:
     publish("node", nodes_table(count), document)
     publish("executors", executors_table(count), document)
     publish("service", service_table(count), document)
+    publish("poses", poses_table(count), document)
     rclpy.try_shutdown()
 
 

@@ -7,6 +7,7 @@ import struct
 import time
 from collections import defaultdict
 from collections.abc import Callable
+from collections.abc import Container
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,13 +16,16 @@ from geometry_msgs.msg import PoseStamped
 from geometry_msgs.msg import WrenchStamped
 from numpy.typing import NDArray
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
+from rclpy.serialization import deserialize_message
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
 from bench.node.timed_node import new_executor
 from ctr_pvs_interfaces.msg import EquilibriumStatus
+from ctr_pvs_ros.outputs.messages import numbers_of
 
 JOINTS = ["outer_rotation", "outer_translation", "inner_rotation", "inner_translation"]
 STAMPED = {"setpoint_js": JointState, "setpoint_cp": PoseStamped, "backbone": PoseArray}
@@ -32,6 +36,8 @@ D = (0.0935, 0.1705)
 SLIDE = (3e-5, 1e-4)
 #: On the tip [N], and how far it turns from one message to the next [rad].
 FORCE, WRENCH_TURN = 0.5, 0.01
+#: Poses go around a circle across the insertion axis, once a second: its radius [m], and the command it begins at.
+RADIUS, BEGIN = 2e-3, (0.0, 0.09, 1.0, 0.17)
 #: Offset of the stamp in a serialized message that begins with a header.
 STAMP = struct.Struct("<4xi")
 TIMEOUT = 20.0  # s
@@ -52,12 +58,13 @@ def wrench(number: int) -> bytes:
 
 @dataclass(frozen=True)
 class Run:
-    """What came back: the fraction of messages answered, and the age of each complete answer [s], from the message to
-    the arrival of the last of its messages."""
+    """What came back: the fraction of messages answered, the age of each complete answer [s], from the message to the
+    arrival of the last of its messages, and how far the tip then was from where a pose had asked it to be [m]."""
 
     rate: float
     answered: float
     ages: NDArray[np.float64]
+    errors: NDArray[np.float64]
 
     def age(self, percent: float) -> float:
         """Percentile of the ages, us."""
@@ -74,24 +81,42 @@ def command(number: int, sliding: bool) -> bytes:
     return serialize_message(message)
 
 
+def message_with(position: NDArray[np.float64], number: int) -> bytes:
+    """Serialized pose; its stamp is ``number`` seconds."""
+    message = PoseStamped()
+    message.header.stamp.sec = number
+    place = message.pose.position
+    place.x, place.y, place.z = position.tolist()
+    return serialize_message(message)
+
+
 class PacedClient:
     """Sends through ``node`` and listens with raw subscribers, so that decoding is not what is measured.
 
     sliding : whether commands also move the tubes' bases.
     loaded : whether a wrench goes out halfway between any two commands.
     status : whether it also listens to ~/status.
+    posing : whether poses for the tip go out in place of commands; then it listens to ~/status, too.
     """
 
-    def __init__(self, node: Node, sliding: bool = False, loaded: bool = False, status: bool = False) -> None:
-        self._sliding = sliding
-        self._topics = STAMPED | ({"ctr_equilibrium/status": EquilibriumStatus} if status else {})
+    def __init__(
+        self, node: Node, sliding: bool = False, loaded: bool = False, status: bool = False, posing: bool = False
+    ) -> None:
+        self._sliding, self._posing = sliding, posing
+        self._topics = STAMPED | ({"ctr_equilibrium/status": EquilibriumStatus} if status or posing else {})
+        self._statuses: list[bytes] = []
+        self._tip = np.zeros(3)
         self._arrivals: dict[int, list[float]] = defaultdict(list)
         self._margins = 0
         every = QoSProfile(depth=100)
         for topic, kind in self._topics.items():
-            node.create_subscription(kind, topic, self._keep, every, raw=True)
+            keep = self._keep_status if kind is EquilibriumStatus else self._keep
+            node.create_subscription(kind, topic, keep, every, raw=True)
         node.create_subscription(Float64, "stability_margin", self._count, every, raw=True)
         self._publisher = node.create_publisher(JointState, "servo_jp", 1)
+        self._poses = node.create_publisher(PoseStamped, "servo_cp", 1) if posing else None
+        self._tips = node.create_subscription(PoseStamped, "setpoint_cp", self._keep_tip, 1) if posing else None
+        self._node = node
         self._wrenches = node.create_publisher(WrenchStamped, "external_wrench", 1) if loaded else None
         self._executor = new_executor("events")
         self._executor.add_node(node)
@@ -99,6 +124,13 @@ class PacedClient:
 
     def _keep(self, message: bytes) -> None:
         self._arrivals[STAMP.unpack_from(message)[0]].append(time.perf_counter())
+
+    def _keep_status(self, message: bytes) -> None:
+        self._keep(message)
+        self._statuses.append(message)
+
+    def _keep_tip(self, message: PoseStamped) -> None:
+        self._tip = np.array(numbers_of(message.pose)[0])
 
     def _count(self, message: bytes) -> None:
         self._margins += 1
@@ -120,19 +152,40 @@ class PacedClient:
         """Wait for the node, and for the answer to a first command."""
         self.spin_until(lambda: self._publisher.get_subscription_count() > 0)
         self.spin_for(SETTLE)
-        self._publisher.publish(command(self._number(), self._sliding))
+        first = command(self._number(), self._sliding)
+        if self._posing:
+            first = serialize_message(JointState(name=JOINTS, position=BEGIN))
+        self._publisher.publish(first)
         self.spin_until(lambda: any(len(arrivals) == len(self._topics) for arrivals in self._arrivals.values()))
         self.spin_for(JOINING)
+        if self._tips is not None:  # decoding is not to be measured
+            self._node.destroy_subscription(self._tips)
 
     def _number(self) -> int:
         self._next += 1
         return self._next - 1
 
+    def _message(self, number: int, count: int, rate: float) -> tuple[Publisher, int, bytes]:
+        """The one of that number, ``count`` messages after the first."""
+        if self._poses is None:
+            return self._publisher, number, command(number, self._sliding)
+        angle = 2.0 * math.pi * count / rate
+        place = self._tip + RADIUS * np.array([0.0, math.cos(angle) - 1.0, math.sin(angle)])
+        return self._poses, number, message_with(place, number)
+
+    def _errors(self, sent: Container[int]) -> NDArray[np.float64]:
+        statuses = [
+            deserialize_message(each, EquilibriumStatus)
+            for each in self._statuses
+            if STAMP.unpack_from(each)[0] in sent
+        ]
+        return np.array([status.tip_distance for status in statuses if status.outcome == EquilibriumStatus.ACCEPTED])
+
     def run(self, rate: float, count: int) -> Run:
         """``count`` commands, ``rate`` a second. A message that is late is not made up for by a hurried one."""
         messages = []
-        for number in (self._number() for _ in range(count)):
-            messages.append((self._publisher, number, command(number, self._sliding)))
+        for index, number in enumerate(self._number() for _ in range(count)):
+            messages.append(self._message(number, index, rate))
             if self._wrenches is not None:
                 number = self._number()
                 messages.append((self._wrenches, number, wrench(number)))
@@ -152,4 +205,4 @@ class PacedClient:
             number: self._arrivals[number] for number in sent if len(self._arrivals[number]) == len(self._topics)
         }
         ages = np.array([max(arrivals) - sent[number] for number, arrivals in complete.items()])
-        return Run(rate, min(len(complete), self._margins - margins) / len(sent), ages)
+        return Run(rate, min(len(complete), self._margins - margins) / len(sent), ages, self._errors(sent))

@@ -89,6 +89,10 @@ class Engine:
         self._local = threading.local()
         self._relaxed_gain: tuple[bytes, float] | None = None
 
+    def __reduce__(self) -> tuple[type[Engine], tuple[Robot, float]]:
+        """Pickled, it is what it was made of: workspaces belong to the threads of one process."""
+        return type(self), (self.robot, self.tolerance)
+
     @property
     def workspace(self) -> Workspace:
         """That of the calling thread."""
@@ -141,14 +145,22 @@ class Engine:
             )
         )  # fmt: skip
 
-    def cold_start(self, alpha: Array, D: Array, untwisted: bool) -> tuple[Code, Array]:
-        """``cold_rows`` for one command: its whole state."""
+    def cold_states(self, alpha: Array, D: Array, untwisted: bool, codes: Ints) -> Array:
+        """``cold_rows`` with room for whole states, which are returned (M, W)."""
+        given = codes.copy()
         while True:
             size = self.state_size
-            out, codes = np.empty((1, size)), np.full(1, -1, dtype=np.int64)
-            self.cold_rows(alpha, D, untwisted, out, codes)
+            states = np.empty((len(codes), size))
+            codes[:] = given
+            self.cold_rows(alpha, D, untwisted, states, codes)
             if self.state_size == size:
-                return int(codes[0]), out[0]
+                return states
+
+    def cold_start(self, alpha: Array, D: Array, untwisted: bool) -> tuple[Code, Array]:
+        """``cold_states`` for one command."""
+        codes = np.full(1, -1, dtype=np.int64)
+        states = self.cold_states(alpha, D, untwisted, codes)
+        return int(codes[0]), states[0]
 
     def untwisted(self, alpha: Array, D: Array) -> tuple[Code, Array]:
         """See ``entries.untwisted_state``."""

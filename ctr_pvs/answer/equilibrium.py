@@ -59,7 +59,7 @@ class Equilibrium:
     snaps : the snaps on the way, each with its place on the path, the states before and after, and the energy released.
 
     Shapes and loads raise ``NoEquilibriumError`` where there is no equilibrium.  Where the tolerance was missed they
-    are there, while ``success`` is false.
+    are there, while ``success`` is false.  Answers can be pickled.
     """
 
     def __init__(
@@ -85,6 +85,10 @@ class Equilibrium:
         self._loads: Loads | None = None
         self._margin = margin
         self.applied_loads = loads
+
+    def __getstate__(self) -> dict[str, object]:
+        """A copy, as another thread may be asking for what is computed late."""
+        return self.__dict__.copy()
 
     @property
     def success(self) -> bool:
@@ -239,7 +243,7 @@ class Equilibrium:
     @property
     def base_wrench(self) -> Wrench:
         """Force [N] and moment [N m] about the orifice that the part beyond it exerts there, base axes: n(0+), m(0+).
-        The guide's reaction is the negative, and |k(0+)|^2 sum K / 2 along +x on the robot more."""
+        The guide's reaction is the negative, and ``|k(0+)|^2 sum K / 2`` along +x on the robot more."""
         wrench = self._engine.base_wrench(self.state.vector)
         return Wrench(wrench[:3], wrench[3:])
 

@@ -35,7 +35,7 @@ from ctr_pvs.cli.robots.info import declare_info
 from ctr_pvs.cli.seeing.plot import declare_plot
 from ctr_pvs.cli.seeing.sweep import declare_sweep
 from ctr_pvs.cli.seeing.workspace import declare_workspace
-from ctr_pvs.cli.stability import declare_stability
+from ctr_pvs.cli.stability.command import declare_stability
 from ctr_pvs.cli.tips.follow import declare_follow
 from ctr_pvs.cli.tips.reach import declare_reach
 from ctr_pvs.cli.version import declare_version

@@ -211,7 +211,7 @@ class Robot:
         D a rounding error (1e-12 m) outside its bounds or order is moved onto them; nothing else changes.
 
         Raises:
-            CommandError: for a wrong count, a value that is not a finite real number, |alpha| above 1e6 rad,
+            CommandError: for a wrong count, a value that is not a finite real number, ``|alpha|`` above 1e6 rad,
                 D_j outside [0, L_j], D_j < D_{j-1}, or a value beyond the robot's limits.
         """
         return self._bounds.check(alpha, D)

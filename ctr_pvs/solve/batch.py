@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from ctr_pvs.answer.engine import Engine
 from ctr_pvs.answer.equilibrium import Equilibrium
+from ctr_pvs.answer.state import State
 from ctr_pvs.answer.status import Status
 from ctr_pvs.errors import CommandError
 from ctr_pvs.errors import LoadError
@@ -75,17 +76,20 @@ def solve_rows(
     tip_moment: ArrayLike | None,
     level: str,
     progress: Progress | None,
+    complete: bool,
+    threads: int | None,
 ) -> Batch:
     """Answers of cold starts to the commands ``alpha`` [rad], ``D`` [m] (M, N) and forces [N] and moments [N m] on the
     tip (M, 3) at a model level.
 
-    progress : called as progress(done, total) after every block of rows.
+    progress : called as progress(done, total) after every block of rows.  complete : margins and forces are noted on
+    the way.  threads : how many, None for one per processor.
 
     A row that the robot cannot take is told in the batch.  Raises ``CommandError`` for arrays that are no tables of
     real numbers with a column per tube, ``LoadError`` for tip loads that are none of 3 columns and as many rows.
     """
     tubes = cold.robot.n_tubes
-    batch = Batch(cold, level, _table("alpha", alpha, tubes), _table("D", D, tubes))
+    batch = Batch(cold, level, _table("alpha", alpha, tubes), _table("D", D, tubes), complete)
     if len(batch.alpha) != len(batch.D):
         raise CommandError("D", batch.D.shape, f"as many rows as alpha has, {len(batch.alpha)}")
     for index in np.flatnonzero(~_plainly_good(cold.robot, batch.alpha, batch.D)).tolist():
@@ -93,7 +97,7 @@ def solve_rows(
     if len(batch) and (tip_force is not None or tip_moment is not None):
         batch.load(_tip_loads("tip_force", tip_force, len(batch)), _tip_loads("tip_moment", tip_moment, len(batch)))
     together = level in ("auto", "torsion") and batch.wrench is None
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         for start in range(0, len(batch), BLOCK):
             stop = min(start + BLOCK, len(batch))
             if together:
@@ -142,17 +146,19 @@ def _plainly_good(robot: Robot, alpha: Array, D: Array) -> Mask:
 
 
 class Batch:
-    """Answers to M commands; ``batch[i]`` is that of row i with every output that single answers have.
+    """Answers to M commands; ``batch[i]`` is that of row i with every output that single answers have, solved again.
 
     alpha, D : (M, N) the commands [rad], [m].  Rows without an equilibrium hold NaN, and zeros for counts.
     wrench : (M, 6) force [N] and moment [N m] on the tips, None without.
     tip_position : (M, 3) [m]; tip_orientation : (M, 4) unit quaternions x, y, z, w; torque : (M, N) [N m].
+    stability_margin : (M,) and force : (M, N) [N], as ``Equilibrium`` has them; unless the batch is ``complete`` every
+    row is solved again when one of them is first asked for.
     residual : (M,) [rad] and error_estimate : (M,) [m], as ``Equilibrium`` has them; iterations, degrees_of_freedom :
     (M,).
     rejected : (M,) true for commands that the robot cannot take: their message says why.
     """
 
-    def __init__(self, cold: ColdSolver, level: str, alpha: Array, D: Array) -> None:
+    def __init__(self, cold: ColdSolver, level: str, alpha: Array, D: Array, complete: bool) -> None:
         count, tubes = alpha.shape
         self._cold, self._level, self.alpha, self.D = cold, level, alpha, D
         self._numbers = np.full((count, STATE + 3 * tubes), np.nan)
@@ -163,6 +169,9 @@ class Batch:
         self.wrench: Array | None = None
         self._messages: dict[int, str] = {}
         self._levels: dict[int, str] = {}
+        self.complete = complete
+        if complete:
+            self._margin_and_force = np.full((count, 1 + tubes), np.nan)
 
     def __len__(self) -> int:
         return len(self.alpha)
@@ -242,12 +251,21 @@ class Batch:
         index = range(len(self))[index]
         return self._messages.get(index, "stable equilibrium" + (SEVERAL if self._codes[index] == MORE else ""))
 
-    @cached_property
+    @property
     def stability_margin(self) -> Array:
-        """(M,) smallest eigenvalue of the energy Hessian relative to torsional stiffness, clipped at 1; NaN without
-        equilibrium."""
-        solved = np.isfinite(self.tip_position[:, 0])
-        return np.array([self[index].stability_margin if solved[index] else np.nan for index in range(len(self))])
+        return self._margin_and_force[:, 0]
+
+    @property
+    def force(self) -> Array:
+        return self._margin_and_force[:, 1:]
+
+    @cached_property
+    def _margin_and_force(self) -> Array:
+        """(M, 1 + N)"""
+        found = np.full((len(self), 1 + self.alpha.shape[1]), np.nan)
+        for index in np.flatnonzero(np.isfinite(self.tip_position[:, 0])).tolist():
+            found[index] = _told(self[index])
+        return found
 
     def mend(self, index: int) -> None:
         """Puts a command on the bounds that it misses by a rounding error, or marks it as one that the robot cannot
@@ -264,15 +282,17 @@ class Batch:
 
     def solve_portion(self, engine: Engine, rows: slice) -> None:
         """Lets the kernel answer some rows."""
-        numbers, codes = self._numbers[rows], self._codes[rows].copy()
-        rejected = numbers[self.rejected[rows]].copy()
-        engine.cold_rows(self.alpha[rows], self.D[rows], self._level == "auto", numbers, codes)
-        numbers[self.rejected[rows]] = rejected
-        good = (codes == OK) | (codes == MORE)
-        numbers[~good] = np.nan
-        self._codes[rows] = np.where(good, codes, ALONE)
-        missed = good & (numbers[:, S_ESTIMATE] > engine.tolerance)
-        self._codes[rows] = np.where(missed, ALONE, self._codes[rows])
+        numbers, codes, tubes = self._numbers[rows], self._codes[rows].copy(), self.alpha.shape[1]
+        asked = codes == UNSOLVED
+        states = engine.cold_states(self.alpha[rows], self.D[rows], self._level == "auto", codes)
+        good = asked & ((codes == OK) | (codes == MORE)) & ~(states[:, S_ESTIMATE] > engine.tolerance)
+        numbers[good] = states[good, : numbers.shape[1]]
+        self._codes[rows] = np.where(good | ~asked, codes, ALONE)
+        for place in np.flatnonzero(good).tolist() if self.complete else ():
+            command, state = (self.alpha[rows][place], self.D[rows][place]), State(states[place], tubes)
+            model = self._cold.force_model
+            answer = Equilibrium(engine, *command, Status.OK, "", self._level, model, state)
+            self._margin_and_force[rows][place] = _told(answer)
 
     def solve_alone(self, index: int) -> None:
         """Leaves one row to the solver of single commands."""
@@ -293,3 +313,10 @@ class Batch:
             answer.error_estimate,
             answer.degrees_of_freedom,
         )
+        if self.complete:
+            self._margin_and_force[index] = _told(answer)
+
+
+def _told(answer: Equilibrium) -> Array:
+    """(1 + N,) margin and forces."""
+    return np.array([answer.stability_margin, *answer.force])

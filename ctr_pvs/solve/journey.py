@@ -31,6 +31,7 @@ DELICATE = 0.1
 MOST_REPEATS = 4
 
 _STATUS = {
+    PathEnd.FOLD: Status.NO_STABLE_EQUILIBRIUM,
     PathEnd.TIMEOUT: Status.TIMEOUT,
     PathEnd.NO_LANDING: Status.NO_STABLE_EQUILIBRIUM,
     PathEnd.TOO_MANY_SNAPS: Status.NOT_CONVERGED,
@@ -58,19 +59,20 @@ class Arrival:
 
 
 def arrive(
-    engine: Engine, origin: State, legs: Sequence[Leg], packed: Array, untwisted: bool, deadline: float
-) -> Arrival:
+    engine: Engine, origin: State, legs: Sequence[Leg], packed: Array, untwisted: bool, deadline: float,
+    halts: bool = False,
+) -> Arrival:  # fmt: skip
     """Travel from ``origin`` along ``legs`` at the lowest degree that keeps the branch up to the converged model, then
     settle under ``packed`` loads on the degrees that the tolerance asks for.
 
     Folds lie a little elsewhere at a low degree.  A journey through one, or to the edge of one, is therefore made again
-    at the next degree, until two agree.
+    at the next degree, until two agree; one that ``halts`` ends at the first fold of any degree.
     """
     iterations, before, walked = 0, None, 0.0
     for index, degree in enumerate(DEGREES[:-1]):
         if index < MOST_REPEATS and degree <= walked:
             continue  # the tolerance has asked for more already: the same journey would agree with itself
-        journey = travel(engine, origin, legs, degree, deadline)
+        journey = travel(engine, origin, legs, degree, deadline, halts)
         walked = engine.elements(journey.state.vector)[:, 3].max(initial=0.0)
         iterations += journey.iterations
         if journey.end is PathEnd.NO_LANDING and index < len(DEGREES) - 2 and not has_moments(engine.robot, packed):

@@ -44,6 +44,8 @@ SHORTEST_STEP = 1e-13
 #: square root of what is left, so this is about 1e-10 rad before it.  Loads in a plane of symmetry lose stability where
 #: the margin falls in proportion to them.
 AT_THE_FOLD, AT_THE_LOADED_FOLD = 1e-5, 1e-6
+#: Who is to halt before a fold need not know where it is.
+NEAR_A_FOLD = 1e-2
 #: Shorter steps than this are a reason to look at the margin.
 SHORT_STEP = 1e-3
 
@@ -121,8 +123,9 @@ class Followed:
 
 
 def follow(
-    engine: Engine, path: CommandPath, start: State, degree: int, deadline: float, begin: float = 0.0
-) -> Followed:
+    engine: Engine, path: CommandPath, start: State, degree: int, deadline: float, begin: float = 0.0,
+    halts: bool = False,
+) -> Followed:  # fmt: skip
     """Follow the equilibrium along ``path`` from ``start``, which is its state at the fraction ``begin``, to the end or
     to the first fold.
 
@@ -133,6 +136,7 @@ def follow(
     longest = longest_step(engine, path)
     length, failed = min(1.0, LARGEST_TURN / max(float(np.ptp(path.alpha_rate)), 1e-300)), False
     end, lost = PathEnd.REACHED, AT_THE_LOADED_FOLD if len(path.end) > 2 * N else AT_THE_FOLD
+    lost = NEAR_A_FOLD if halts else lost
     while t < 1.0:
         if time.monotonic() > deadline:
             end = PathEnd.TIMEOUT
@@ -164,17 +168,19 @@ def longest_step(engine: Engine, path: CommandPath) -> float:
     return LARGEST_SLIDE * max(tube.length for tube in engine.robot.tubes) / max(slide, 1e-300)
 
 
-def travel(engine: Engine, start: State, legs: Sequence[Leg], degree: int, deadline: float) -> Followed:
-    """Go from ``start`` along ``legs``; at a fold, snap and go on from the landing."""
+def travel(
+    engine: Engine, start: State, legs: Sequence[Leg], degree: int, deadline: float, halts: bool = False
+) -> Followed:
+    """Go from ``start`` along ``legs``; at a fold, snap and go on from the landing, or end there if it ``halts``."""
     state, iterations, t = start, 0, 0.0
     snaps: list[Snap] = []
     for leg in legs:
         t = 0.0
         while True:
-            followed = follow(engine, leg.path, state, degree, deadline, t)
+            followed = follow(engine, leg.path, state, degree, deadline, t, halts)
             state, t, end = followed.state, followed.t, followed.end
             iterations += followed.iterations
-            if end is not PathEnd.FOLD:
+            if end is not PathEnd.FOLD or halts:
                 break
             if len(snaps) == MOST_SNAPS:
                 end = PathEnd.TOO_MANY_SNAPS

@@ -77,11 +77,8 @@ class EquilibriumSolver:
             check_renda2021(robot)
         if not 1e-10 <= tolerance <= 1.0:
             raise FieldError("tolerance", tolerance, "a length from 1e-10 to 1 m")
-        self.robot = robot
-        self.tolerance = float(tolerance)
-        self.force_model = force_model
-        self._level = fidelity
-        self._untwisted = fidelity == "auto"
+        self.robot, self.tolerance, self.force_model = robot, float(tolerance), force_model
+        self._level, self._untwisted, self._halts = fidelity, fidelity == "auto", False
         self._engine = Engine(robot, self.tolerance)
         self._last: State | None = None
         self._acting: Loads | None = None
@@ -108,8 +105,7 @@ class EquilibriumSolver:
         """
         if self._last is None:
             raise NoEquilibriumError("no coupled equilibrium to start from: solve a command first")
-        state = self._last
-        alpha, D = state.alpha, state.D
+        state, alpha, D = self._last, self._last.alpha, self._last.D
         lengths = np.array([tube.length for tube in self.robot.tubes])
         lowest, highest = np.append(0.0, D[:-1]), np.minimum(np.append(D[1:], np.inf), lengths)
         bounds = np.concatenate([alpha - turn, lowest]), np.concatenate([alpha + turn, highest])
@@ -159,11 +155,15 @@ class EquilibriumSolver:
 
         return sense(solve, told, np.array(guess, dtype=np.float64), largest_std)
 
-    def fork(self, answer: Equilibrium | None = None) -> Self:
-        """A solver that does not share the warm start: its own is ``answer``, one of this robot's, or none."""
+    def fork(self, answer: Equilibrium | None = None, halts: bool | None = None) -> Self:
+        """A solver that does not share the warm start: its own is ``answer``, one of this robot's, or none.
+
+        halts : whether it looks for no landing where a stable branch ends: NO_STABLE_EQUILIBRIUM.  None is as this one.
+        """
         other = type(self).__new__(type(self))
         other.__dict__.update(self.__dict__)
         other._last, other._acting, other._play = None, None, None  # commands are those of the tubes
+        other._halts = self._halts if halts is None else halts
         if answer is not None and answer.state.coupled:
             other._last, other._acting = answer.state, answer.applied_loads
         return other
@@ -228,25 +228,24 @@ class EquilibriumSolver:
         return self._travelled(self._last, legs, at, packed, deadline, "")
 
     def solve_batch(
-        self,
-        alpha: ArrayLike,
-        D: ArrayLike,
-        start: str = "cold",
-        progress: Progress | None = None,
-        *,
-        tip_force: ArrayLike | None = None,
-        tip_moment: ArrayLike | None = None,
-    ) -> Batch:
+        self, alpha: ArrayLike, D: ArrayLike, start: str = "cold", progress: Progress | None = None, *,
+        tip_force: ArrayLike | None = None, tip_moment: ArrayLike | None = None, complete: bool = False,
+        threads: int | None = None,
+    ) -> Batch:  # fmt: skip
         """Many commands at once: the answers of cold starts to the rows of ``alpha`` [rad] and ``D`` [m] (M, N), under
         ``tip_force`` [N] and ``tip_moment`` [N m], (M, 3) each or None.
 
         progress : called as progress(done, total) from time to time.  The warm start of ``solve`` stays as it is.
+        complete : margins and forces are worked out on the way; else whoever asks for them has every row solved again.
+        threads : None for one per processor.
 
         A row that the robot cannot take is told in the batch.  Raises ``CommandError`` for arrays that are no tables of
         real numbers with a column per tube, ``FieldError`` for a wrong option.
         """
         check_choice("start", start, ("cold",))
-        return solve_rows(self, self._engine, alpha, D, tip_force, tip_moment, self._level, progress)
+        return solve_rows(
+            self, self._engine, alpha, D, tip_force, tip_moment, self._level, progress, complete, threads
+        )  # fmt: skip
 
     def solve_alone(self, alpha: Array, D: Array, loads: Loads | None) -> Equilibrium:
         """A cold start that leaves the warm start as it is; for threads of a batch."""
@@ -274,7 +273,7 @@ class EquilibriumSolver:
         self, origin: State, legs: list[Leg], at: Command, packed: Array, deadline: float, note: str
     ) -> Equilibrium:
         """The answer at the end of a journey."""
-        arrival = arrive(self._engine, origin, legs, packed, self._untwisted, deadline)
+        arrival = arrive(self._engine, origin, legs, packed, self._untwisted, deadline, self._halts)
         if arrival.state is None:
             return self._failure(at, arrival.status, arrival.message, arrival.iterations)
         return self._keep(at, arrival.state, arrival.snaps, arrival.iterations, note)

@@ -11,16 +11,19 @@ from ctr_pvs.errors import FieldError
 
 Array = NDArray[np.float64]
 
+#: How many metres a radian counts as.
+LEVER = 0.02
+
 
 class Aim:
     """A position (3,) [m], and either the tangent there (3,) or the whole orientation (4,), quaternion x, y, z, w.
 
-    within [m] and within_angle [rad] : how near is there.  lever [m] : how many metres a radian counts as.
+    within [m] and within_angle [rad] : how near is there.
     """
 
     def __init__(
-        self, position: ArrayLike, tangent: ArrayLike | None, orientation: ArrayLike | None, within: float,
-        within_angle: float, lever: float,
+        self, position: ArrayLike, tangent: ArrayLike | None = None, orientation: ArrayLike | None = None,
+        within: float = 1e-6, within_angle: float = 1e-4,
     ) -> None:  # fmt: skip
         if tangent is not None and orientation is not None:
             raise FieldError("tangent", tangent, "None beside an orientation, which holds the tangent")
@@ -28,7 +31,6 @@ class Aim:
         self.tangent = None if tangent is None else _unit("tangent", tangent, 3)
         self.orientation = None if orientation is None else _unit("orientation", orientation, 4)
         self.within, self.within_angle = _positive("within", within), _positive("within_angle", within_angle)
-        self.lever = lever
 
     @property
     def turns(self) -> bool:
@@ -36,29 +38,29 @@ class Aim:
         return self.tangent is not None or self.orientation is not None
 
     def residual(self, answer: Equilibrium) -> Array:
-        """(3,) or (6,) [m]: how far the tip is off, rotation times the lever."""
+        """(3,) or (6,) [m]: how far the tip is off, a rotation times ``LEVER``."""
         tip = answer.tip
         off = tip.position - self.position
         if not self.turns:
             return off
-        return np.concatenate([off, self.lever * self._rotation(tip.orientation)])
+        return np.concatenate([off, LEVER * self._rotation(tip.orientation)])
 
     def jacobian(self, answer: Equilibrium) -> Array:
         """(3 or 6, 2 N) rates of the residual with alpha [m/rad] and D."""
         rates = answer.jacobian
         if self.orientation is not None:
-            return np.concatenate([rates[:3], self.lever * rates[3:]])
+            return np.concatenate([rates[:3], LEVER * rates[3:]])
         if self.tangent is not None:
             x, y, z = tangent_of(answer.tip.orientation).tolist()
             turned = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])  # d tangent = rotation x tangent
-            return np.concatenate([rates[:3], self.lever * turned @ rates[3:]])
+            return np.concatenate([rates[:3], LEVER * turned @ rates[3:]])
         return np.asarray(rates[:3])
 
     def miss(self, position: Array, orientation: Array) -> Array:
         """(M,) [m^2] squared residuals of tips at positions (M, 3) with orientations (M, 4)."""
         square = ((position - self.position) ** 2).sum(axis=1)
         if self.turns:
-            square += self.lever**2 * (self._rotation(orientation) ** 2).sum(axis=1)
+            square += LEVER**2 * (self._rotation(orientation) ** 2).sum(axis=1)
         return np.asarray(square)
 
     def distance(self, answer: Equilibrium) -> float:

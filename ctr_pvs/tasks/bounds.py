@@ -13,6 +13,7 @@ from ctr_pvs.errors import FieldError
 from ctr_pvs.robot.command import LARGEST_ALPHA
 from ctr_pvs.robot.robot import Limits
 from ctr_pvs.robot.robot import Robot
+from ctr_pvs.tasks.kinks import Kinks
 
 Array = NDArray[np.float64]
 
@@ -46,6 +47,7 @@ class Bounds:
         order = eye[N : 2 * N - 1] - eye[N + 1 :]
         rows = np.concatenate([eye, -eye, order])
         right = np.concatenate([high / self.scale, -low / self.scale, np.zeros(N - 1)])
+        self.kinks = Kinks(robot, self.unit)
         self._actuator = self._of_actuators()
         kept = np.abs(right) < LARGEST_ALPHA
         self.rows, self.right, self._actuator = rows[kept], right[kept], self._actuator[kept]

@@ -25,6 +25,8 @@ RIDGE = 1e-9
 LONGEST, SHORTENED = 1.0, 0.3
 #: Tries to shorten a step that is refused or leads no nearer.
 TRIES = 9
+#: What keeps a step to a kink, as a share of J^T J.
+STIFF = 1e4
 #: A step that is to bring the tip nearer by less than this share, squared, is none.
 LEVEL = 1e-9
 #: What is free beside the aim goes from bounds and from strain: how far in a step, the margin below which strain
@@ -33,14 +35,16 @@ INWARD, RELAXING, STRAINED, LAST = 0.004, 0.2, 0.5, 1e-3
 
 
 class Patience(NamedTuple):
-    """A descent is over after so many steps that each bring less than this share of the squared distance."""
+    """A descent is over after so many steps that each bring less than this share of the squared distance; whether it
+    tries to slide along kinks where no other way is downhill."""
 
     share: float
     steps: int
+    slides: bool
 
 
 #: To the closest point; to see whether there is much to hope for.
-PATIENT, HASTY = Patience(1e-4, 4), Patience(5e-2, 3)
+PATIENT, HASTY = Patience(1e-4, 4, True), Patience(5e-2, 3, False)
 
 
 class End(Enum):
@@ -67,7 +71,7 @@ class Descent(NamedTuple):
 
 def descend(walker: Walker, aim: Aim, bounds: Bounds, steps: int, patience: Patience = PATIENT) -> Descent:
     """Moves ``walker`` towards the aim in about ``steps`` steps at most."""
-    way = _Way(walker, aim, bounds)
+    way = _Way(walker, aim, bounds, patience.slides)
     slow = 0
     while True:
         before = way.left
@@ -86,14 +90,15 @@ class _Way:
     """A descent on its way: the residual where the walker stands, its square ``left`` [m^2], its gradient (2 N,), what
     was refused last, how many steps were ``tried``, the damping and the longest step to try."""
 
-    def __init__(self, walker: Walker, aim: Aim, bounds: Bounds) -> None:
-        self._walker, self._aim, self._bounds = walker, aim, bounds
+    def __init__(self, walker: Walker, aim: Aim, bounds: Bounds, slides: bool) -> None:
+        self._walker, self._aim, self._bounds, self._slides = walker, aim, bounds, slides
         self._damping, self._longest = DAMPING, LONGEST
         self._residual = aim.residual(walker.answer)
         self.left = float(self._residual @ self._residual)
         self.gradient = np.zeros(2 * bounds.tubes)
         self.refusal: Refusal | None = None
         self.tried = 0
+        self._kink: int | None = None
 
     def advance(self) -> End | None:
         """A step that leads nearer; else why there is none."""
@@ -104,8 +109,25 @@ class _Way:
         self.gradient, square = rates.T @ self._residual, rates.T @ rates
         free = _preferred(self._walker, self._bounds, self.left)
         x = self._bounds.scaled(answer.alpha, answer.D)
+        ends = []
+        for kink in self._ways(x):
+            ends.append(self._down(x, square, free, kink))
+            if ends[-1] not in (End.LEVEL, End.REFUSED):
+                self._kink = kink
+                return ends[-1]
+            self._damping = min(self._damping, DAMPING)
+        return ends[0]
+
+    def _ways(self, x: Array) -> list[int | None]:
+        """What to try from x, one after the other: as the last step was taken, freely, and along the kinks near by."""
+        near = self._bounds.kinks.near(x) if self._slides else []
+        return list(dict.fromkeys([self._kink, None, *near]))
+
+    def _down(self, x: Array, square: Array, free: Array, kink: int | None) -> End | None:
+        """A step that leads nearer, one that keeps to a ``kink`` if one is named; else why there is none."""
+        answer = self._walker.answer
         for _ in range(TRIES):
-            d = self._step(x, square, free)
+            d = self._step(x, square, free, kink)
             foretold = -float(d @ (2.0 * self.gradient + square @ d))
             if foretold <= LEVEL * self.left:
                 return End.LEVEL
@@ -122,12 +144,17 @@ class _Way:
                 self._damping *= RAISED
         return End.REFUSED if self.refusal is not None else End.LEVEL
 
-    def _step(self, x: Array, square: Array, free: Array) -> Array:
-        """(2 N,) the damped step from x, J^T J being ``square``; ``free`` is where damping pulls it to."""
+    def _step(self, x: Array, square: Array, free: Array, kink: int | None) -> Array:
+        """(2 N,) the damped step from x, J^T J being ``square``; ``free`` is where damping pulls it to, and a ``kink``
+        where it ends."""
         damping = self._damping * self.left + RIDGE * float(np.trace(square))
-        held = square + damping * np.eye(len(x))
-        d = self._bounds.step(x, held, self.gradient - damping * free)
-        return np.asarray(d * min(1.0, self._longest / max(float(np.abs(d).max()), 1e-300)))
+        held, gradient, kinks = square + damping * np.eye(len(x)), self.gradient - damping * free, self._bounds.kinks
+        if kink is not None:
+            row = STIFF * float(np.trace(square)) * kinks.rows[kink]
+            held, gradient = held + np.outer(row, kinks.rows[kink]), gradient + row * kinks.off(x, kink)
+        d = self._bounds.step(x, held, gradient)
+        d = d * min(1.0, self._longest / max(float(np.abs(d).max()), 1e-300))
+        return np.asarray(d if kink is None else kinks.onto(x + d, kink) - x)
 
     def _nearer(self, foretold: float) -> bool:
         """Whether the step taken leads nearer: then it is kept, and the next one may be longer if this one did as

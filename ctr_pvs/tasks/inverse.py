@@ -27,6 +27,7 @@ from ctr_pvs.tasks.table import Table
 from ctr_pvs.tasks.walk import Refusal
 from ctr_pvs.tasks.walk import Step
 from ctr_pvs.tasks.walk import Walker
+from ctr_pvs.tasks.walk import left
 
 Array = NDArray[np.float64]
 Start = Equilibrium | tuple[ArrayLike, ArrayLike]
@@ -84,34 +85,19 @@ class InverseResult:
 
 
 class InverseSearch:
-    """Searches of one solver under the same limits: they share the table of starts, which is made when it is first
+    """Searches of one solver under the same limits: they share the table of starts, which is made as far as it is
     needed.
-
-    within [m], within_angle [rad] : how near is there.  lever : metres that a radian counts as beside the position.
     """
 
-    def __init__(
-        self, solver: EquilibriumSolver, limits: Limits | None = None, within: float = 1e-6,
-        within_angle: float = 1e-4, lever: float = 0.02,
-    ) -> None:  # fmt: skip
+    def __init__(self, solver: EquilibriumSolver, limits: Limits | None = None) -> None:
         self.solver, self.bounds = solver, Bounds(solver.robot, limits)
-        self._within, self._within_angle, self._lever = within, within_angle, lever
-        self._table: Table | None = None
-
-    @property
-    def table(self) -> Table:
-        if self._table is None:
-            self._table = Table(self.solver, self.bounds)
-        return self._table
-
-    def aim(self, position: ArrayLike, tangent: ArrayLike | None, orientation: ArrayLike | None) -> Aim:
-        return Aim(position, tangent, orientation, self._within, self._within_angle, self._lever)
+        self._table = Table(solver, self.bounds)
 
     def walker(self, start: Start | None, loads: Loads | None, floor: float, deadline: float) -> Walker:
         """At the start, under ``loads``; raises ``NoEquilibriumError`` where there is no equilibrium without a snap."""
         other = self.solver.fork(start if isinstance(start, Equilibrium) else None)
         alpha, D = (start.alpha, start.D) if isinstance(start, Equilibrium) else start or self.bounds.centre()
-        answer = other.solve(alpha, D, loads=loads)
+        answer = other.solve(alpha, D, loads=loads, budget=left(deadline))
         if not answer.success or (answer.snaps and isinstance(start, Equilibrium)):
             raise NoEquilibriumError(f"no equilibrium to set out from: {answer.message}")
         return Walker(self.solver, answer, floor, deadline)
@@ -124,7 +110,8 @@ class InverseSearch:
         found = [descend(first, aim, self.bounds, STEPS, HASTY)]
         cut_off: list[tuple[Array, Array]] = []
         if found[0].end is not End.TIMEOUT and (every or found[0].end is not End.MET):
-            for start in self.table.starts(aim, STARTS_FOR_ALL if every else STARTS):
+            self._table.fill(walker.deadline)
+            for start in self._table.starts(aim, STARTS_FOR_ALL if every else STARTS):
                 descent = self._by_way_of(start, aim, walker)
                 if descent is None:
                     cut_off.append(start)
@@ -133,8 +120,8 @@ class InverseSearch:
                 if descent.end is End.TIMEOUT or (not every and _settled(found)):
                     break
         iterations = sum(descent.iterations for descent in found)
-        if every:
-            return self._all(aim, found, iterations)
+        if every and any(descent.end is End.MET for descent in found):
+            return self._all(aim, found, iterations, walker.late)
         best = self._polished(aim, found)
         if best.end not in (End.MET, End.TIMEOUT):
             beyond = self._beyond_snaps(aim, walker, cut_off)
@@ -188,17 +175,16 @@ class InverseSearch:
                 return replace(result, status=InverseStatus.SNAP, message=f"{message} was found", way=())
         return None
 
-    def _all(self, aim: Aim, found: list[Descent], iterations: int) -> InverseResult:
+    def _all(self, aim: Aim, found: list[Descent], iterations: int, late: bool) -> InverseResult:
         """The solution of largest margin, with the others that are not its neighbours."""
         met = [descent for descent in found if descent.end is End.MET]
-        if not met:
-            return self._told(aim, min(found, key=lambda descent: descent.left), iterations)
         distinct: list[Descent] = []
         for descent in sorted(met, key=lambda descent: -descent.walker.way[-1].margin):
             if all(self._apart(descent, other) > DISTINCT for other in distinct):
                 distinct.append(descent)
         told = [self._told(aim, descent, iterations) for descent in distinct]
-        return replace(told[0], others=tuple(told[1:]))
+        message = told[0].message + ("; out of time, there may be more solutions" if late else "")
+        return replace(told[0], message=message, others=tuple(told[1:]))
 
     def _apart(self, one: Descent, other: Descent) -> float:
         """The largest difference of two commands, whole turns of a tube left out."""

@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 #: The first stretch of the path that is tried in one [m], and the shortest, as a share of the tolerance.
 STRETCH, SHORTEST = 2e-3, 0.05
 #: Steps of a descent from one place of the path to the next; the tip meets a place to this share of the tolerance.
-STEPS, SHARE = 12, 0.05
+STEPS, SHARE = 40, 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +145,7 @@ class _Track:
 
     def _stretch(self, end: float) -> tuple[InverseStatus, str] | None:
         """To the arc length ``end`` of the path, in a straight line of commands; why not, if not."""
-        aim = Aim(self._path.at(end), None, None, SHARE * self._tolerance, 1.0, 1.0)
+        aim = Aim(self._path.at(end), within=SHARE * self._tolerance)
         found = descend(self.walker.branch(), aim, self._search.bounds, STEPS)
         if found.end is not End.MET:
             return outcome(self._search.bounds, found)
@@ -170,10 +170,10 @@ class _Track:
 
 
 def motion(search: InverseSearch, walker: Walker, waypoints: ArrayLike, tolerance: float, rates: Rates) -> Motion:
-    """From where ``walker`` stands to the first of the waypoints (M, 3) [m], and along them; ``search`` looks for
-    places to a share of the ``tolerance`` [m].  See ``EquilibriumSolver.motion``."""
+    """From where ``walker`` stands to the first of the waypoints (M, 3) [m], and along them, within the ``tolerance``
+    [m].  See ``EquilibriumSolver.motion``."""
     path = Polyline(waypoints)
-    first = search.search(search.aim(path.corners[0], None, None), walker)
+    first = search.search(Aim(path.corners[0], within=SHARE * tolerance), walker)
     there = Walker(search.solver, first.equilibrium, walker.floor, walker.deadline)
     track = _Track(there, search, path, tolerance, rates)
     if first.success:

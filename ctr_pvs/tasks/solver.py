@@ -10,10 +10,10 @@ from ctr_pvs.robot.robot import Limits
 from ctr_pvs.robot.robot import Robot
 from ctr_pvs.solve import solver as solve
 from ctr_pvs.solve.path import deadline_of
+from ctr_pvs.tasks.aim import Aim
 from ctr_pvs.tasks.inverse import InverseResult
 from ctr_pvs.tasks.inverse import InverseSearch
 from ctr_pvs.tasks.inverse import Start
-from ctr_pvs.tasks.motion import SHARE
 from ctr_pvs.tasks.motion import Deployment
 from ctr_pvs.tasks.motion import Motion
 from ctr_pvs.tasks.motion import Rates
@@ -28,7 +28,7 @@ class EquilibriumSolver(solve.EquilibriumSolver):
         self, robot: Robot, tolerance: float = 1e-5, fidelity: str = "auto", force_model: str = "virtual_work"
     ) -> None:
         super().__init__(robot, tolerance, fidelity, force_model)
-        self._search: tuple[tuple[object, ...], InverseSearch] | None = None
+        self._search: tuple[Limits | None, InverseSearch] | None = None
 
     def inverse(
         self,
@@ -63,8 +63,8 @@ class EquilibriumSolver(solve.EquilibriumSolver):
         the start.
         """
         deadline = deadline_of(budget)
-        search = self._searching(limits, within, within_angle)
-        aim = search.aim(position, tangent, orientation)
+        search = self._searching(limits)
+        aim = Aim(position, tangent, orientation, within, within_angle)
         walker = search.walker(self._here(start), loads, _checked_floor(margin_floor), deadline)
         return search.search(aim, walker, all)
 
@@ -89,7 +89,7 @@ class EquilibriumSolver(solve.EquilibriumSolver):
         deadline = deadline_of(budget)
         if not 0.0 < tolerance < 1.0:
             raise FieldError("tolerance", tolerance, "a length above 0 m, below 1 m")
-        search = self._searching(limits, SHARE * tolerance, 1e-4)
+        search = self._searching(limits)
         start = self._here(start)
         walker = search.walker(start, loads, _checked_floor(margin_floor), deadline)
         return motion(search, walker, waypoints, tolerance, rates or Rates())
@@ -101,11 +101,10 @@ class EquilibriumSolver(solve.EquilibriumSolver):
         first from a cold start; looked at in ``places`` of the body."""
         return follow_the_leader(self, alpha, D, loads, places)
 
-    def _searching(self, limits: Limits | None, within: float, within_angle: float) -> InverseSearch:
+    def _searching(self, limits: Limits | None) -> InverseSearch:
         """The last search, with its table of starts, if it fits."""
-        key = (limits, within, within_angle)
-        if self._search is None or self._search[0] != key:
-            self._search = key, InverseSearch(self.fork(), limits, within, within_angle)
+        if self._search is None or self._search[0] != limits:
+            self._search = limits, InverseSearch(self.fork(), limits)
         return self._search[1]
 
     def _here(self, start: Start | None) -> Start | None:

@@ -1,18 +1,26 @@
 """Many commands, answered chunk by chunk in a fixed order: what has been answered can be kept, and gone on from later.
 
-Every row is a cold start by itself, so a row has the same answer, bit for bit, however the rows are cut into chunks and
-from whichever row a run sets out.
+Every row is a cold start by itself, so a row has the same answer, bit for bit, however the rows are cut into chunks,
+from whichever row a run sets out, and whoever answers a chunk: any ``concurrent.futures.Executor``, be it threads of
+this process or the workers of a cluster.
 """
 
 from __future__ import annotations
 
 import math
 import os
+import pickle
 import time
+from collections import deque
 from collections.abc import Iterator
 from collections.abc import Sequence
+from concurrent.futures import Executor
+from concurrent.futures import Future
 from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import wait
+from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
@@ -21,7 +29,6 @@ from numpy.typing import NDArray
 from ctr_pvs.answer.status import Status
 from ctr_pvs.errors import CommandError
 from ctr_pvs.robot.robot import Robot
-from ctr_pvs.solve.batch import Batch
 from ctr_pvs.solve.solver import EquilibriumSolver
 
 Array = NDArray[np.float64]
@@ -34,11 +41,14 @@ _CODE = {status: code for code, status in enumerate(Status)}
 
 #: Rows of the first chunk and the most of any; how long one is to take [s], so that whoever waits hears of it and can
 #: stop it: a row takes from 0.1 ms to 0.1 s, as robot, loads and compiler will have it.
-FIRST, MOST, PACE = 32, 8192, 0.5
+FIRST, MOST, PACE = 32, 1024, 0.5
+#: Chunks that are under way, at most: enough for some hundred workers, and with MOST a bound of memory.  The first is
+#: alone, and with every answer there are twice as many: until then nobody knows how long a row takes.
+AHEAD = 256
+#: Whoever waits is asked after so long [s].
+LOOK = 1.0
 #: Rows of a grid: years of work, and far below what overflows.
 MOST_ROWS = 10**12
-#: Rows that a thread takes at once.
-PORTION = 16
 
 
 class Layout:
@@ -156,43 +166,66 @@ class Listed:
         return self._table[start:stop]
 
 
-def sweep(solver: EquilibriumSolver, commands: Commands, first: int = 0, chunk: int | None = None) -> Iterator[Rows]:
+def sweep(
+    solver: EquilibriumSolver,
+    commands: Commands,
+    first: int = 0,
+    chunk: int | None = None,
+    workers: Executor | None = None,
+) -> Iterator[Rows]:
     """The answers of cold starts to ``commands`` from row ``first`` on, chunk by chunk, in their order.
 
-    chunk : rows of each; None for as many as take about half a second.
+    chunk : rows of each; None for as many as one worker answers in about half a second.
+    workers : who answers the chunks, one each at a time; None for a thread per processor.  To other processes the
+        solver travels pickled, and is kept there.
+
+    A chunk without rows says that nothing has come for a while, so that whoever waits can look after other things.
     """
-    count, total = chunk or FIRST, len(commands)
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        while first < total:
-            began = time.perf_counter()
-            rows = answered(solver, commands.layout, commands.rows(first, min(first + count, total)), pool)
-            seconds = time.perf_counter() - began
+    with ExitStack() as stack:
+        pool = workers or stack.enter_context(ThreadPoolExecutor(os.cpu_count()))
+        yield from _in_order(pool, pickle.dumps(solver.fork()), commands, first, chunk)
+
+
+def _in_order(pool: Executor, solver: bytes, commands: Commands, first: int, chunk: int | None) -> Iterator[Rows]:
+    total, count, ahead = len(commands), chunk or FIRST, 1
+    under_way: deque[Future[tuple[Rows, float]]] = deque()
+    try:
+        while first < total or under_way:
+            while first < total and len(under_way) < ahead:
+                table = commands.rows(first, min(first + count, total))
+                under_way.append(pool.submit(answered, solver, commands.layout, table))
+                first += len(table)
+            if not wait([under_way[0]], LOOK).done:
+                yield joined(commands.layout, [])
+                continue
+            rows, seconds = under_way.popleft().result()
             yield rows
-            first += len(rows)
+            ahead = min(2 * ahead, AHEAD)
             if chunk is None:
-                count = int(min(MOST, 4 * count, max(1.0, count * PACE / seconds)))
+                count = int(min(MOST, 4 * len(rows), max(1.0, len(rows) * PACE / seconds)))
+    finally:
+        for future in under_way:
+            future.cancel()
 
 
-def answered(solver: EquilibriumSolver, layout: Layout, commands: Array, pool: ThreadPoolExecutor) -> Rows:
-    """The answers to a table of commands (n, C): tips and torques of the batch, margins and forces row by row."""
+def answered(solver: bytes, layout: Layout, commands: Array) -> tuple[Rows, float]:
+    """What one worker makes of a chunk of commands (n, C): the answers of a pickled solver, and the seconds it took."""
+    began = time.perf_counter()
     numbers = np.full((len(commands), len(layout.names)), np.nan)
     numbers[:, layout.commands] = commands
     rows = Rows(layout, numbers, np.zeros(len(commands), dtype=np.int8))
     force = rows["tip_force"] if "tip_force" in layout.groups else None
-    batch = solver.solve_batch(rows["alpha"], rows["D"], tip_force=force)
-    for key in ("tip_position", "tip_orientation", "torque"):
+    batch = _unpickled(solver).solve_batch(rows["alpha"], rows["D"], tip_force=force, complete=True, threads=1)
+    for key in ("tip_position", "tip_orientation", "torque", "force"):
         rows[key][:] = getattr(batch, key)
+    rows["stability_margin"][:, 0] = batch.stability_margin
     rows.codes[:] = [_CODE[status] for status in batch.status]
     rows.codes[batch.rejected] = REJECTED
-    solved = np.flatnonzero(np.isfinite(batch.tip_position[:, 0])).tolist()
-    portions = [solved[start : start + PORTION] for start in range(0, len(solved), PORTION)]
-    list(pool.map(lambda portion: _complete(rows, batch, portion), portions))
-    return rows
+    return rows, time.perf_counter() - began
 
 
-def _complete(rows: Rows, batch: Batch, portion: list[int]) -> None:
-    """What a batch does not hold, from the full answers."""
-    for index in portion:
-        answer = batch[index]
-        rows["stability_margin"][index] = answer.stability_margin
-        rows["force"][index] = answer.force
+@lru_cache(maxsize=2)
+def _unpickled(solver: bytes) -> EquilibriumSolver:
+    """One for all threads of this process: a batch keeps nothing in it, and each thread has a workspace of its own."""
+    kept: EquilibriumSolver = pickle.loads(solver)
+    return kept

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,12 +17,15 @@ Array = NDArray[np.float64]
 
 #: Rows, by the number of tubes, and at most.
 ROWS, MOST_ROWS = 256, 2048
+#: Rows between two looks at the clock.
+BLOCK = 32
 #: Starts nearer to each other than this, in units of ``Bounds.scaled``, count as one.
 APART = 0.6
 
 
 class Table:
-    """Commands spread evenly within the bounds, with the tips of cold starts there, without loads.
+    """Commands spread evenly within the bounds, with the tips of cold starts there, without loads; empty until it is
+    filled.
 
     x : (M, 2 N) commands, see ``Bounds``, of which those that snapped are left out; position (M, 3), orientation
     (M, 4).  A common rotation of all tubes turns the tip about +x and is left to ``starts``.
@@ -36,11 +41,19 @@ class Table:
         alpha = np.column_stack([np.full(count, first), least + share[:, : N - 1] * np.maximum(most - least, 0.0)])
         # The square makes rows of tubes far out more frequent: there the tip is farthest from that of its neighbours.
         D = np.maximum.accumulate(low[N:] + share[:, N - 1 :] ** 1.5 * (high[N:] - low[N:]), axis=1)
-        batch = solver.fork().solve_batch(alpha, D)
-        good = batch.status == Status.OK
-        self._bounds = bounds
-        self.x = np.concatenate([alpha, D], axis=1)[good] / bounds.scale
-        self.position, self.orientation = batch.tip_position[good], batch.tip_orientation[good]
+        self._solver, self._bounds, self._left = solver.fork(halts=True), bounds, np.concatenate([alpha, D], axis=1)
+        self.x, self.position, self.orientation = np.empty((0, 2 * N)), np.empty((0, 3)), np.empty((0, 4))
+
+    def fill(self, deadline: float) -> None:
+        """Solves for what is not solved for yet, as far as it goes until a ``time.monotonic()`` value."""
+        while len(self._left) and time.monotonic() < deadline:
+            rows, self._left = self._left[:BLOCK], self._left[BLOCK:]
+            alpha, D = np.split(rows, 2, axis=1)
+            batch = self._solver.solve_batch(alpha, D)
+            good = batch.status == Status.OK
+            self.x = np.concatenate([self.x, rows[good] / self._bounds.scale])
+            self.position = np.concatenate([self.position, batch.tip_position[good]])
+            self.orientation = np.concatenate([self.orientation, batch.tip_orientation[good]])
 
     def starts(self, aim: Aim, count: int) -> list[tuple[Array, Array]]:
         """The ``count`` commands, alpha and D (N,), with the tips nearest to the aim, all tubes turned together to

@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 #: Between two looks at the margin tubes turn against each other by no more than this [rad], and slide no farther than
 #: this share of the longest tube.
 TURN, SLIDE = 0.5, 0.05
+#: A solve that comes too late still ends as one that is out of time [s].
+LEAST_BUDGET = 1e-6
 
 
 class Step(NamedTuple):
@@ -40,6 +42,11 @@ class Refusal(Enum):
     FAILED = "no equilibrium was found"
 
 
+def left(deadline: float) -> float | None:
+    """The budget [s] until a ``time.monotonic()`` value; None where there is none."""
+    return None if deadline == np.inf else max(deadline - time.monotonic(), LEAST_BUDGET)
+
+
 class Walker:
     """Stands on an answer and remembers how it came there.
 
@@ -49,7 +56,7 @@ class Walker:
     def __init__(
         self, solver: EquilibriumSolver, answer: Equilibrium, floor: float, deadline: float, way: Sequence[Step] = ()
     ) -> None:
-        self._solver, self.answer, self.floor, self.deadline = solver.fork(answer), answer, floor, deadline
+        self._solver, self.answer, self.floor, self.deadline = solver.fork(answer, True), answer, floor, deadline
         self.loads: Loads | None = answer.applied_loads
         self.way = list(way) or [Step(answer.alpha, answer.D, answer.stability_margin)]
 
@@ -63,10 +70,9 @@ class Walker:
 
     def go(self, alpha: Array, D: Array) -> Refusal | None:
         """One step; where it is refused the walker stays."""
-        left = self.deadline - time.monotonic()
-        if left <= 0.0:
+        if self.late:
             return Refusal.TIMEOUT
-        answer = self._solver.solve(alpha, D, budget=None if left == np.inf else left, loads=self.loads)
+        answer = self._solver.solve(alpha, D, budget=left(self.deadline), loads=self.loads)
         refusal = self._judged(answer)
         if refusal is None:
             self.answer = answer
@@ -98,7 +104,7 @@ class Walker:
     def _judged(self, answer: Equilibrium) -> Refusal | None:
         if answer.status is Status.TIMEOUT:
             return Refusal.TIMEOUT
-        if answer.snaps:
+        if answer.status is Status.NO_STABLE_EQUILIBRIUM:  # the branch ends
             return Refusal.SNAP
         if not answer.success:
             return Refusal.FAILED

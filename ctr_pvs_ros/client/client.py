@@ -1,4 +1,4 @@
-"""Clients of the node: the service, and commands in lock step, each of which waits for everything that answers it."""
+"""Clients of the node: its services, and commands in lock step, each of which waits for everything that answers it."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from sensor_msgs.msg import JointState
 
 from ctr_pvs_interfaces.msg import EquilibriumStatus
 from ctr_pvs_interfaces.srv import SolveEquilibrium
+from ctr_pvs_interfaces.srv import SolveInverse
 from ctr_pvs_ros.client.texts import answered
 
 NODE_NAME = "ctr_equilibrium"
@@ -60,20 +61,29 @@ class Client:
 
 
 class ServiceClient(Client):
-    """Calls the service of the equilibrium node `name` in the namespace of `node`."""
+    """Calls the services of the equilibrium node `name` in the namespace of `node`."""
 
     def __init__(self, node: Node, name: str = NODE_NAME) -> None:
         super().__init__(node)
         self._solve = node.create_client(SolveEquilibrium, f"{name}/solve")
+        self._inverse = node.create_client(SolveInverse, f"{name}/inverse")
 
-    def wait_for_service(self, timeout: float) -> None:
-        """Wait until the service is there; raises NoReply."""
-        self.spin_until(self._solve.service_is_ready, timeout, f"service {self._solve.service_name}")
+    def wait_for_services(self, timeout: float) -> None:
+        """Wait until the services are there; raises NoReply."""
+        for service in (self._solve, self._inverse):
+            self.spin_until(service.service_is_ready, timeout, f"service {service.service_name}")
 
     def solve(self, request: SolveEquilibrium.Request, timeout: float) -> SolveEquilibrium.Response:
-        """Call the service, once it is there; raises NoReply."""
-        self.wait_for_service(timeout)
-        future = self._solve.call_async(request)
+        """Call ~/solve, once it is there; raises NoReply."""
+        return self._called(self._solve, request, timeout)
+
+    def inverse(self, request: SolveInverse.Request, timeout: float) -> SolveInverse.Response:
+        """Call ~/inverse, once it is there; raises NoReply."""
+        return self._called(self._inverse, request, timeout)
+
+    def _called(self, service: Any, request: Any, timeout: float) -> Any:
+        self.spin_until(service.service_is_ready, timeout, f"service {service.service_name}")
+        future = service.call_async(request)
         self.spin_until(future.done, timeout, "service reply")
         return future.result()
 

@@ -1,4 +1,4 @@
-"""The executable ctr_client, see front: command a running node, watch it, and ask its service, from a shell."""
+"""The executable ctr_client, see front: command a running node, watch it, and ask its services, from a shell."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import rclpy
+from geometry_msgs.msg import PoseStamped
 from geometry_msgs.msg import Vector3
 from geometry_msgs.msg import Wrench
 from rclpy.exceptions import NameValidationException
@@ -23,6 +24,7 @@ from ctr_pvs.cli.live.view import address_of
 from ctr_pvs.cli.live.view import new_server
 from ctr_pvs.cli.words import UsageError
 from ctr_pvs_interfaces.srv import SolveEquilibrium
+from ctr_pvs_interfaces.srv import SolveInverse
 from ctr_pvs_ros.client import texts as client_texts
 from ctr_pvs_ros.client.client import NoReply
 from ctr_pvs_ros.client.client import ServiceClient
@@ -140,17 +142,51 @@ def _view(node: Node, arguments: argparse.Namespace) -> int:
 
 def _solve(node: Node, arguments: argparse.Namespace) -> int:
     client = ServiceClient(node, arguments.node)
-    _find(client.wait_for_service, arguments.wait)
-    names, positions = zip(*arguments.joints, strict=True)
-    force, moment = (Vector3(**dict(zip("xyz", vector, strict=True))) for vector in (arguments.force, arguments.moment))
+    _find(client.wait_for_services, arguments.wait)
     request = SolveEquilibrium.Request(
-        joints=JointState(name=list(names), position=list(positions)),
-        warm_start=arguments.warm,
-        tip_wrench=Wrench(force=force, torque=moment),
+        joints=_joints(arguments), warm_start=arguments.warm, tip_wrench=_tip_wrench(arguments)
     )
     response = client.solve(request, arguments.wait)
     print((client_texts.response_as_json if arguments.json else client_texts.response_as_text)(response))
     return ANSWERED if response.success else NOT_ANSWERED
 
 
-RUN = {"send": _send, "watch": _watch, "view": _view, "solve": _solve}
+def _inverse(node: Node, arguments: argparse.Namespace) -> int:
+    client = ServiceClient(node, arguments.node)
+    _find(client.wait_for_services, arguments.wait)
+    target = PoseStamped()
+    for part, names, values in (
+        (target.pose.position, "xyz", arguments.position),
+        (target.pose.orientation, "xyzw", arguments.orientation or (0.0, 0.0, 0.0, 1.0)),
+    ):
+        for name, value in zip(names, values, strict=True):
+            setattr(part, name, value)
+    request = SolveInverse.Request(
+        target=target,
+        goal=arguments.goal,
+        within=arguments.within,
+        within_angle=arguments.within_angle,
+        start=_joints(arguments),
+        tip_wrench=_tip_wrench(arguments),
+        margin_floor=arguments.margin_floor,
+        all=arguments.all,
+        time_limit=arguments.time_limit,
+    )
+    response = client.inverse(request, arguments.wait)
+    if arguments.json:
+        print(client_texts.search_as_json(response))
+    else:
+        print(client_texts.search_as_text(response, arguments.degrees))
+    return ANSWERED if response.success else NOT_ANSWERED
+
+
+def _joints(arguments: argparse.Namespace) -> JointState:
+    return JointState(name=[name for name, _ in arguments.joints], position=[place for _, place in arguments.joints])
+
+
+def _tip_wrench(arguments: argparse.Namespace) -> Wrench:
+    force, moment = (Vector3(**dict(zip("xyz", vector, strict=True))) for vector in (arguments.force, arguments.moment))
+    return Wrench(force=force, torque=moment)
+
+
+RUN = {"send": _send, "watch": _watch, "view": _view, "solve": _solve, "inverse": _inverse}

@@ -16,7 +16,9 @@ if TYPE_CHECKING:
     from sensor_msgs.msg import JointState
 
     from ctr_pvs_interfaces.msg import EquilibriumStatus
+    from ctr_pvs_interfaces.msg import InverseSolution
     from ctr_pvs_interfaces.srv import SolveEquilibrium
+    from ctr_pvs_interfaces.srv import SolveInverse
 
 #: By the numbers of EquilibriumStatus.outcome and of the bits of .trigger.
 OUTCOMES = ("accepted", "refused", "failed", "snap")
@@ -34,6 +36,8 @@ OF_STATUS = (
     "degrees_of_freedom",
     "tip_distance",
 )
+OF_SEARCH = ("success", "status", "message", "iterations", "solve_time")
+OF_SOLUTION = ("distance", "angle", "stability_margin", "way_stability_margin")
 OF_RESPONSE = (
     "success",
     "status",
@@ -83,10 +87,7 @@ def status_as_text(
     rows += [("load", wrench)] if (wrench := _wrench(status.applied_wrench)) else []
     rows += [("tip", _tip(tip))] if tip is not None else []
     if joints is not None:
-        rows += [
-            (name, _joint(name, position, effort, degrees))
-            for name, position, effort in zip(joints.name, joints.position, joints.effort, strict=True)
-        ]
+        rows += _joint_rows(joints, degrees)
     return _aligned(rows)
 
 
@@ -148,6 +149,47 @@ def response_as_json(response: SolveEquilibrium.Response) -> str:
     )
 
 
+def search_as_text(response: SolveInverse.Response, degrees: bool = False) -> str:
+    """Some lines: the status, and every command that was found."""
+    rows = [(response.status, response.message)]
+    solutions = [response.solution, *response.others] if response.solution.command.name else []
+    if solutions:
+        rows.append(("solve time", f"{response.solve_time * 1e3:.2f} ms, {response.iterations} steps tried"))
+    for number, solution in enumerate(solutions, start=1):
+        rows += [("solution", f"{number} of {len(solutions)}")] if len(solutions) > 1 else []
+        rows += _solution(solution, degrees)
+    return _aligned(rows)
+
+
+def search_as_json(response: SolveInverse.Response) -> str:
+    """One line of JSON."""
+    content = {name: getattr(response, name) for name in OF_SEARCH}
+    solutions = [response.solution, *response.others] if response.solution.command.name else []
+    return _json({**content, "solutions": [_solution_content(solution) for solution in solutions]})
+
+
+def _solution(solution: InverseSolution, degrees: bool) -> list[tuple[str, str]]:
+    way = solution.way_stability_margin
+    told = f"{len(way)} commands, least margin {min(way):.4f} (--json: all)" if len(way) else "none known"
+    return [
+        *_quality(solution.stability_margin, math.nan, math.nan),
+        ("tip", _tip(solution.tip)),
+        *_joint_rows(solution.command, degrees),
+        ("way", told),
+    ]
+
+
+def _solution_content(solution: InverseSolution) -> dict[str, Any]:
+    joints = {name: list(getattr(solution.command, name)) for name in ("name", "position", "effort")}
+    count, way = len(joints["name"]), list(solution.way)
+    return {
+        **{name: getattr(solution, name) for name in OF_SOLUTION},
+        "joints": joints,
+        "tip": _pose(solution.tip.pose),
+        "way": [way[first : first + count] for first in range(0, len(way), count)],
+    }
+
+
 def _quality(margin: float, reserve: float, error: float) -> list[tuple[str, str]]:
     """What is known of them."""
     told = (
@@ -164,6 +206,13 @@ def _solve(told: Any) -> list[tuple[str, str]]:
         return []
     by = f", {told.fidelity} with {told.degrees_of_freedom} unknowns" if told.degrees_of_freedom else ""
     return [("solve time", f"{told.solve_time * 1e3:.2f} ms{by}")]
+
+
+def _joint_rows(joints: JointState, degrees: bool) -> list[tuple[str, str]]:
+    return [
+        (name, _joint(name, position, effort, degrees))
+        for name, position, effort in zip(joints.name, joints.position, joints.effort, strict=True)
+    ]
 
 
 def _joint(name: str, position: float, effort: float, degrees: bool) -> str:

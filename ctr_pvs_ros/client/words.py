@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from ctr_pvs.cli.live.view import declare_page
 from ctr_pvs.cli.version import declare_version
 from ctr_pvs.cli.words import Parser
+from ctr_pvs.cli.words import UsageError
 from ctr_pvs.cli.words import number
 from ctr_pvs.cli.words import shielded
 from ctr_pvs.cli.words import whole_number
@@ -23,11 +24,16 @@ Joint = tuple[str, float]
 def parse(words: Sequence[str]) -> argparse.Namespace:
     """The words after the program's name; raises ctr_pvs.cli's UsageError.
 
-    The result has `command`, which is send, watch, view or solve, and what that takes; `joints` are in rad and m.
+    The result has `command`, which is send, watch, view, solve or inverse, and what that takes; `joints` are in rad
+    and m; for inverse also `goal` and `orientation`, as SolveInverse wants them.
     """
     arguments = _parser().parse_args(shielded(_joints_first(words)))
     if "joints" in arguments and arguments.degrees:
         arguments.joints = [_in_radians(joint) for joint in arguments.joints]
+    if arguments.command == "inverse":
+        arguments.goal = "tangent" if arguments.tangent else "orientation" if arguments.orientation else "position"
+        if arguments.tangent:
+            arguments.orientation = _turned_from_x(arguments.tangent)
     arguments.namespace = arguments.namespace.strip("/")
     return arguments
 
@@ -54,6 +60,17 @@ def _in_radians(joint: Joint) -> Joint:
     return name, math.radians(value) if name.endswith(ROTATION) else value
 
 
+def _turned_from_x(direction: Sequence[float]) -> list[float]:
+    """The quaternion xyzw of the least rotation that turns the x axis into a direction."""
+    x, y, z = direction
+    size = math.hypot(x, y, z)
+    if size == 0.0:
+        raise UsageError("--tangent: expected a direction, got zeros (see ctr_client inverse --help)")
+    quaternion = [0.0, -z, y, size + x] if size + x > 1e-12 * size else [0.0, 0.0, 1.0, 0.0]
+    whole = math.hypot(*quaternion)
+    return [part / whole for part in quaternion]
+
+
 def _parser() -> Parser:
     parser = Parser(
         prog="ctr_client",
@@ -67,18 +84,43 @@ def _parser() -> Parser:
     watch = _declared(subcommands, "watch", "a line for each command or wrench as the node tells of it, until Ctrl-C")
     view = _declared(subcommands, "view", "the tubes as the node moves them, on a page in a browser, until Ctrl-C")
     solve = _declared(subcommands, "solve", "one equilibrium from ~/solve, beside the stream of commands")
+    inverse = _declared(subcommands, "inverse", "the command that brings the tip to a place, and a way, from ~/inverse")
     for subcommand in (send, solve):
-        _declare_joints(subcommand)
-    for subcommand in (send, watch, solve):
+        _declare_joints(subcommand, "+", "<tube>_rotation [rad] or <tube>_translation [m]")
+    for subcommand in (send, watch, solve, inverse):
         subcommand.add_argument("--json", action="store_true", help="one JSON object a line; SI units, null: not known")
     declare_page(view, "that has the longest arrow")
+    _declare_joints(inverse, "*", "where the way begins (none: the stream's last answer)")
+    _declare_place(inverse)
     watch.add_argument("--count", type=whole_number(1, 10**9), metavar="N", help="end after so many lines")
     solve.add_argument("--warm", action="store_true", help="set out from the service's last answer, not from rest")
     for kind, letter, unit in (("force", "F", "N"), ("moment", "M", "N m")):
         axes = tuple(f"{letter}{axis}" for axis in "XYZ")
         text = f"external {kind} on the tip, along the base's axes [{unit}]"
-        solve.add_argument(f"--{kind}", nargs=3, type=number, default=[0.0] * 3, metavar=axes, help=text)
+        for subcommand in (solve, inverse):
+            subcommand.add_argument(f"--{kind}", nargs=3, type=number, default=[0.0] * 3, metavar=axes, help=text)
     return parser
+
+
+def _declare_place(inverse: Parser) -> None:
+    """Where the tip should be, and how it is looked for."""
+    axes = ("X", "Y", "Z")
+    inverse.add_argument("--position", nargs=3, type=number, required=True, metavar=axes, help="of the tip [m]")
+    turned = inverse.add_mutually_exclusive_group()
+    turned.add_argument("--tangent", nargs=3, type=number, metavar=axes, help="direction of the tip")
+    turned.add_argument(
+        "--orientation", nargs=4, type=number, metavar=(*axes, "W"), help="of the tip's frame, a quaternion"
+    )
+    for name, default, metavar, text in (
+        ("--within", 1e-6, "M", "how near is there [m]"),
+        ("--within-angle", 1e-4, "RAD", "and how near a tangent or an orientation [rad]"),
+        ("--margin-floor", 0.1, "M", "least margin of the way"),
+    ):
+        inverse.add_argument(name, type=number, default=default, metavar=metavar, help=f"{text} (%(default)g)")
+    inverse.add_argument("--all", action="store_true", help="look for all solutions, the largest margin first")
+    inverse.add_argument(
+        "--time-limit", type=number, default=0.0, metavar="S", help="of the search [s] (0: the node's compute_budget)"
+    )
 
 
 def _declared(subcommands: argparse._SubParsersAction[Parser], name: str, text: str) -> Parser:
@@ -89,14 +131,8 @@ def _declared(subcommands: argparse._SubParsersAction[Parser], name: str, text: 
     return subcommand
 
 
-def _declare_joints(subcommand: Parser) -> None:
-    subcommand.add_argument(
-        "joints",
-        nargs="+",
-        type=joint,
-        metavar="JOINT=POSITION",
-        help="<tube>_rotation [rad] or <tube>_translation [m]",
-    )
+def _declare_joints(subcommand: Parser, count: str, text: str) -> None:
+    subcommand.add_argument("joints", nargs=count, type=joint, metavar="JOINT=POSITION", help=text)
     subcommand.add_argument("--degrees", action="store_true", help="rotations are in degrees, in what is printed, too")
     subcommand.add_argument(
         "--wait", type=number, default=10.0, metavar="S", help="for the node, and for its answer [s] (%(default)g)"

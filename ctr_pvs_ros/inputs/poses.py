@@ -48,6 +48,15 @@ class TipGoal:
     orientation: Array | None = None
     whole: bool = False
 
+    @property
+    def parts(self) -> tuple[Array, Array | None, Array | None]:
+        """Position, tangent and orientation, those None that do not count: what inverse kinematics asks for."""
+        if self.orientation is None or self.whole:
+            return self.position, None, self.orientation
+        from ctr_pvs.tasks.aim import tangent_of  # brings scipy along, which takes longer than a refusal may
+
+        return self.position, tangent_of(self.orientation), None
+
     def distance(self, answer: Equilibrium) -> float:
         """[m] from an answer's tip to the position."""
         return float(np.linalg.norm(answer.tip.position - self.position))

@@ -1,1 +1,1 @@
-"""The service ~/solve: the node's end of it, and the process that solves."""
+"""The services ~/solve and ~/inverse: the node's end of them, and the process that solves."""

@@ -1,9 +1,11 @@
-"""Single solves, as the node has them done in another process: what is asked, and what came of it."""
+"""Jobs, as the node has them done in another process: what is asked, and what came of it."""
 
 from __future__ import annotations
 
 import time
 import warnings
+from abc import ABC
+from abc import abstractmethod
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 from typing import Any
@@ -55,30 +57,50 @@ class SolverOptions:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class Job:
-    """One command to solve for.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Job(ABC):
+    """Something to be done.
 
     Attributes:
-        number: which tells its answer from others.
-        alpha, D: (N,) [rad], [m].
-        start: cold or warm.
-        poses: on the backbone.
+        number: which tells its answer from others; set when it is handed over.
         deadline: on the system's monotonic clock [s].
     """
 
-    number: int
+    deadline: float
+    number: int = 0
+
+    @abstractmethod
+    def done_by(self, solver: EquilibriumSolver, budget: float) -> Solved:
+        """What comes of it within `budget` [s]."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SolveJob(Job):
+    """One command to solve for.
+
+    Attributes:
+        alpha, D: (N,) [rad], [m].
+        start: cold or warm.
+        poses: on the backbone.
+    """
+
     alpha: NDArray[Any]
     D: NDArray[Any]
     loads: Loads
     start: str
     poses: int
-    deadline: float
+
+    def done_by(self, solver: EquilibriumSolver, budget: float) -> Solved:
+        began = time.monotonic()
+        equilibrium = solver.solve(self.alpha, self.D, start=self.start, budget=budget, loads=self.loads)
+        took = time.monotonic() - began
+        numbers = numbers_of(equilibrium, self.poses) if equilibrium.success else None
+        return Solved(self.number, equilibrium.status.value, equilibrium.message, took, numbers)
 
 
 @dataclass(frozen=True, eq=False)
 class Numbers:
-    """All of an equilibrium that is told."""
+    """All of an equilibrium that a solve tells."""
 
     tip: Pose
     backbone: Backbone
@@ -94,7 +116,7 @@ class Solved:
     status: str
     message: str
     time: float = 0.0
-    numbers: Numbers | None = None
+    numbers: Any = None
 
 
 @dataclass(frozen=True)
@@ -108,21 +130,17 @@ class Ready:
 
 
 def do(solver: EquilibriumSolver, job: Job) -> Solved:
-    """Solve; never raises."""
-    began = time.monotonic()
-    left = job.deadline - began
+    """Do a job; never raises."""
+    left = job.deadline - time.monotonic()
     if left <= 0.0:
         return Solved(job.number, Status.TIMEOUT.value, "the budget was over before other requests were done")
     try:
-        equilibrium = solver.solve(job.alpha, job.D, start=job.start, budget=left, loads=job.loads)
-        took = time.monotonic() - began
-        numbers = numbers_of(equilibrium, job.poses) if equilibrium.success else None
+        return job.done_by(solver, left)
     except FieldError as error:  # a load, at a model level or with a force model that knows none
         return Solved(job.number, BAD_INPUT, str(error))
     except Exception as error:  # whatever went wrong, the client gets an answer
         text = f"internal error: {type(error).__name__}: {error}"
         return Solved(job.number, Status.NOT_CONVERGED.value, text)
-    return Solved(job.number, equilibrium.status.value, equilibrium.message, took, numbers)
 
 
 def numbers_of(equilibrium: Equilibrium, poses: int) -> Numbers:

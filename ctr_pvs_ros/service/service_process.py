@@ -1,4 +1,4 @@
-"""The node's end of the process that does single solves.
+"""The node's end of the process that does jobs.
 
 In one process the two would share one interpreter lock. Compiled kernels do without it, so a solve in another thread
 holds it for some microseconds between two calls only; but whoever gets it from there is woken on the processor of that
@@ -104,7 +104,7 @@ class ServiceProcess:
         with its:
             # A session of its own: Ctrl-C in a terminal is for the node, which ends this process.
             self._process = subprocess.Popen(
-                [sys.executable, "-m", "ctr_pvs_ros.service.single_solves", str(its.fileno())],
+                [sys.executable, "-m", "ctr_pvs_ros.service.job_process", str(its.fileno())],
                 pass_fds=(its.fileno(),),
                 stdin=subprocess.DEVNULL,
                 start_new_session=True,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import threading
 from concurrent.futures import ThreadPoolExecutor
 
@@ -12,6 +13,7 @@ from random_robots import random_robot
 
 from ctr_pvs import Equilibrium
 from ctr_pvs import EquilibriumSolver
+from ctr_pvs import Loads
 
 TOLERANCE = 1e-6
 
@@ -105,3 +107,17 @@ def test_many_solvers_in_many_threads():
             assert (found is None) == (own is None)
             if own is not None:
                 assert_equal(found, own)
+
+
+def test_an_answer_that_went_to_another_process_tells_the_same(seed_robot):
+    """Asked before and after, and the solver over there goes on from it."""
+    here = EquilibriumSolver(seed_robot, TOLERANCE)
+    answer = here.solve([0.1, 1.2], [0.09, 0.2], loads=Loads(tip_force=(0.0, 0.1, 0.0)))
+    unread = pickle.loads(pickle.dumps(answer))
+    told = outputs(answer)
+    assert_equal(told, outputs(unread))
+    assert_equal(told, outputs(pickle.loads(pickle.dumps(answer))))
+    there = EquilibriumSolver(seed_robot, TOLERANCE).fork(unread)
+    for solver in (here, there):
+        solver.follow([0.1, 1.5], [0.09, 0.2])
+    assert_equal(*(outputs(solver.solve([0.1, 1.6], [0.09, 0.2])) for solver in (here, there)))

@@ -97,7 +97,7 @@ def test_ctrl_c_keeps_what_is_done_and_resume_ends_with_the_same_file(capsys, tm
     plain = Grid.rows
 
     def interrupted(grid, start, stop):
-        if start > 0:
+        if start == 5:  # once, though more is asked for ahead
             os.kill(os.getpid(), signal.SIGINT)
             time.sleep(0.05)  # for the handler
         return plain(grid, start, min(stop, start + 5))

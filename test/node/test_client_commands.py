@@ -6,7 +6,9 @@ import re
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from ctr_pvs.cli.words import UsageError
 from ctr_pvs_ros.client import texts as client_texts
@@ -15,6 +17,8 @@ from ctr_pvs_ros.client.words import parse
 ROOT = Path(__file__).parents[2]
 STATUS_FILE = ROOT / "ctr_pvs_interfaces" / "msg" / "EquilibriumStatus.msg"
 RESPONSE_FILE = ROOT / "ctr_pvs_interfaces" / "srv" / "SolveEquilibrium.srv"
+SEARCH_FILE = ROOT / "ctr_pvs_interfaces" / "srv" / "SolveInverse.srv"
+SOLUTION_FILE = ROOT / "ctr_pvs_interfaces" / "msg" / "InverseSolution.msg"
 NAN = math.nan
 
 
@@ -80,6 +84,31 @@ def test_options_may_stand_between_joints():
     assert arguments.warm
 
 
+def test_a_place_may_have_a_direction_a_start_and_defaults_of_the_service():
+    arguments = parse(["inverse", "a=1", "--position", "0.1", "-2e-3", "0", "b=2"])
+    assert (arguments.position, arguments.goal, arguments.orientation) == ([0.1, -0.002, 0.0], "position", None)
+    assert arguments.joints == [("a", 1.0), ("b", 2.0)]
+    defaults = dict(re.findall(r"^\w+ (\w+) (\S+)$", SEARCH_FILE.read_text(encoding="utf-8"), re.MULTILINE))
+    for name in ("within", "within_angle", "margin_floor"):
+        assert getattr(arguments, name) == float(defaults[name])
+    assert (arguments.all, arguments.time_limit) == (False, 0.0)
+    place = ["inverse", "--position", "0", "0", "0"]
+    assert parse(place).joints == []
+    turned = parse([*place, "--orientation", "0", "0", "0.6", "0.8"])
+    assert (turned.goal, turned.orientation) == ("orientation", [0.0, 0.0, 0.6, 0.8])
+
+
+@pytest.mark.parametrize(
+    "direction", [(0.0, 0.0, 3.0), (-1.0, 1e-3, 0.0), (0.2, -0.5, 0.1), (1.0, 0.0, 0.0), (-2.0, 0.0, 0.0)]
+)
+def test_a_direction_becomes_an_orientation_whose_x_axis_it_is(direction):
+    words = [str(part) for part in direction]
+    arguments = parse(["inverse", "--position", "0", "0", "0", "--tangent", *words])
+    assert arguments.goal == "tangent"
+    turned = Rotation.from_quat(arguments.orientation).apply([1.0, 0.0, 0.0])
+    assert turned == pytest.approx(np.array(direction) / np.linalg.norm(direction), abs=1e-12)
+
+
 @pytest.mark.parametrize("command", ["send", "solve"])
 def test_degrees_are_for_rotations_only(command):
     arguments = parse([command, "--degrees", "a_rotation=180", "a_translation=0.1", "rotation=90"])
@@ -98,6 +127,13 @@ def test_degrees_are_for_rotations_only(command):
         (["send", "a=1", "--wait", "soon"], "--wait: expected a finite number"),
         (["send", "a=1", "--warm"], "unrecognized arguments: --warm"),
         (["solve", "a=1", "--force", "0", "1"], "--force: expected 3 arguments"),
+        (["inverse", "a=1"], "required: --position"),
+        (["inverse", "--position", "0", "0"], "--position: expected 3 arguments"),
+        (
+            ["inverse", "--position", "0", "0", "0", "--tangent", "1", "0", "0", "--orientation", "0", "0", "0", "1"],
+            "not allowed with",
+        ),
+        (["inverse", "--position", "0", "0", "0", "--tangent", "0", "0", "0"], "--tangent: expected a direction"),
         (["watch", "--count", "0"], "--count: expected a whole number from 1"),
         (["watch", "a=1"], "unrecognized arguments: a=1"),
         (["stop"], "invalid choice: 'stop'"),
@@ -113,7 +149,7 @@ def test_words_that_cannot_be_meant_are_told_of_in_one_line(words, told):
 
 
 def test_help_tells_the_exit_codes(capsys):
-    for words in (["--help"], ["send", "--help"], ["watch", "--help"], ["solve", "--help"]):
+    for words in (["--help"], ["send", "--help"], ["watch", "--help"], ["solve", "--help"], ["inverse", "--help"]):
         with pytest.raises(SystemExit) as end:
             parse(words)
         assert end.value.code == 0
@@ -129,10 +165,18 @@ def test_outcomes_and_triggers_are_those_of_the_message():
     assert numbers == {name.upper(): str(number) for number, name in ours}
 
 
-@pytest.mark.parametrize(("names", "file"), [("OF_STATUS", STATUS_FILE), ("OF_RESPONSE", RESPONSE_FILE)])
+@pytest.mark.parametrize(
+    ("names", "file"),
+    [
+        ("OF_STATUS", STATUS_FILE),
+        ("OF_RESPONSE", RESPONSE_FILE),
+        ("OF_SEARCH", SEARCH_FILE),
+        ("OF_SOLUTION", SOLUTION_FILE),
+    ],
+)
 def test_json_has_every_field_of_the_message_that_needs_no_form_of_its_own(names, file):
     fields = re.findall(r"^\w+(?:\[\])? (\w+)$", file.read_text(encoding="utf-8").rpartition("---")[2], re.MULTILINE)
-    own = {"trigger", "outcome", "backbone_s"}
+    own = {"trigger", "outcome", "backbone_s", "solution", "others", "way"}
     assert set(getattr(client_texts, names)) == set(fields) - own
 
 
@@ -222,3 +266,57 @@ def test_a_response_as_json():
     assert (told["status"], told["force_upper"], told["energy"]) == ("ok", [2.0, -0.5], None)
     assert told["backbone"] == {"s": [0.095], "position": [told["tip"]["position"]], "orientation": [[0, 0, 0, 1]]}
     assert json.loads(client_texts.response_as_json(response(success=False)))["tip"] is None
+
+
+def solution(**fields):
+    usual = {
+        "command": joints(),
+        "tip": tip(),
+        "distance": 2e-7,
+        "angle": 0.0,
+        "stability_margin": 0.75,
+        "way": [0.0, 0.1, 1.0, 0.06, math.pi / 2, 0.05],
+        "way_stability_margin": [1.0, 0.5, 0.75],
+    }
+    return SimpleNamespace(**{**usual, **fields})
+
+
+def search(**fields):
+    usual = {"success": True, "status": "reached", "message": "there", "iterations": 9, "solve_time": 0.0125}
+    return SimpleNamespace(**{**usual, "solution": solution(), "others": [], **fields})
+
+
+def nothing_found():
+    nowhere = SimpleNamespace(name=[], position=[], effort=[])
+    return search(success=False, status="bad_input", message="no", solution=solution(command=nowhere))
+
+
+def test_a_search_as_text():
+    assert client_texts.search_as_text(search(), degrees=True).splitlines() == [
+        "reached        there",
+        "solve time     12.50 ms, 9 steps tried",
+        "margin         0.7500 (1 far from a snap, 0 at it)",
+        "tip              80.948   14.570  -38.895 mm in ctr_base",
+        "a_rotation         90.000 deg      0.2500 N m",
+        "a_translation    0.050000 m       -1.5000 N",
+        "way            3 commands, least margin 0.5000 (--json: all)",
+    ]
+    several = client_texts.search_as_text(search(others=[solution(way=[], way_stability_margin=[])]))
+    assert re.findall(r"^(?:solution|way) +(.*)$", several, re.MULTILINE) == [
+        "1 of 2",
+        "3 commands, least margin 0.5000 (--json: all)",
+        "2 of 2",
+        "none known",
+    ]
+    assert client_texts.search_as_text(nothing_found()) == "bad_input  no"
+
+
+def test_a_search_as_json():
+    told = json.loads(client_texts.search_as_json(search(others=[solution(distance=NAN)])))
+    assert (told["status"], told["success"], told["iterations"]) == ("reached", True, 9)
+    first, second = told["solutions"]
+    assert first["way"] == [[0.0, 0.1], [1.0, 0.06], [math.pi / 2, 0.05]]
+    assert first["way_stability_margin"] == [1.0, 0.5, 0.75]
+    assert first["joints"] == vars(joints()) and first["tip"]["orientation"] == [0, 0, 0, 1]
+    assert second["distance"] is None
+    assert json.loads(client_texts.search_as_json(nothing_found()))["solutions"] == []

@@ -7,6 +7,7 @@ import ast
 import numpy as np
 import pytest
 from conftest import ROOT
+from elastica import side_force_elastica
 from loaded_cases import CASES
 from loaded_cases import Case
 from loaded_cases import robot_of
@@ -15,9 +16,7 @@ from random_robots import random_D
 from random_robots import random_robot
 from scipy.optimize import brentq
 from scipy.special import ellipe
-from scipy.special import ellipeinc
 from scipy.special import ellipk
-from scipy.special import ellipkinc
 
 from ctr_pvs import Robot
 from ctr_pvs import Segment
@@ -71,14 +70,8 @@ def test_the_relaxed_robot(case: Case):
 
 
 def test_elastica_under_a_side_force():
-    """K. E. Bisshopp, D. C. Drucker, "Large deflection of cantilever beams" (1945), in elliptic integrals."""
     for angle in (0.2, 0.8, 1.3):  # of the tip
-        p = np.sqrt(0.5 * (1.0 + np.sin(angle)))
-        start = np.arcsin(1.0 / (p * np.sqrt(2.0)))
-        lam = ellipk(p**2) - ellipkinc(start, p**2)  # L sqrt(P / K)
-        away = LENGTH * (1.0 - 2.0 / lam * (ellipe(p**2) - ellipeinc(start, p**2)))
-        along = LENGTH * np.sqrt(2.0 * np.sin(angle)) / lam
-        P = K * (lam / LENGTH) ** 2
+        P, along, away = side_force_elastica(angle, LENGTH, K)
         for y, z in ((0.0, 1.0), (0.6, -0.8)):
             solution = along_path(ROD, [0.0], [GUIDE], Loads(tip_force=(0.0, y * P, z * P)), [0.0])
             assert solution.success

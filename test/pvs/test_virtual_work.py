@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 from bvp_shape import BvpShape
 from bvp_shape import elastic_energy
+from energy_differences import KINKS
+from energy_differences import kink_robot
 from random_robots import random_D
 from random_robots import random_robot
 
-from ctr_pvs import Robot
-from ctr_pvs import Segment
-from ctr_pvs import Tube
 from ctr_pvs.model.materials import Materials
 from ctr_pvs.model.sections import piecewise_domain
 from ctr_pvs.oracles.standard_model import solve_standard_bvp
@@ -86,23 +85,6 @@ def test_sum_rules(seed):
     expected = 0.5 * shape.materials.bending[0].sum() * abs(shape.curvature(0, np.zeros(1))[0]) ** 2
     assert loads.force.sum() == pytest.approx(expected, rel=1e-7, abs=1e-9)
     assert elastic_energy(shape) > shape.materials.straightening_energy.sum()
-
-
-def kink_robot() -> Robot:
-    """Three tubes with round lengths, so that boundaries can be laid on one another exactly."""
-    a = Segment(0.05, 0.06, 0.045), Segment(0.06, 0.05, 0.04, (9.0, 40.0))
-    b = Segment(0.10, 0.03, 0.022, (-3.0 + 2.0j,)), Segment(0.06, 0.025, 0.02, (6.0j,), 15.0)
-    c = Segment(0.15, 0.010, 0.008), Segment(0.05, 0.012, 0.009, (12.0 + 5.0j,)), Segment(0.03, 0.011, 0.007, (4.0,))
-    return Robot("kinks", (Tube("a", a), Tube("b", b), Tube("c", c)))
-
-
-KINKS = {
-    "boundary of a on the orifice": ([0.05, 0.07, 0.13], [0]),
-    "boundaries of b and c coincide": ([0.03, 0.06, 0.11], [1, 2]),
-    "tips of a and b coincide": ([0.02, 0.07, 0.115], [0, 1]),
-    "three at one place, tips of all": ([0.03, 0.08, 0.15], [0, 1, 2]),
-    "tip of a on the orifice": ([0.11, 0.12, 0.165], [0]),
-}
 
 
 @pytest.mark.parametrize("name", KINKS)

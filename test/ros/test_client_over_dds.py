@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import signal
 import subprocess
 import sys
@@ -188,10 +189,33 @@ def test_the_service_takes_a_load(peer):
     assert turned[1] - free[1] > 1e-4
 
 
+def test_what_inverse_finds_can_be_sent(peer):
+    assert at_the_node("send", *WORDS, "--degrees", "--wait", "40").returncode == 0
+    words = ["inverse", "--position", "0.085", "0.01", "-0.035", "--wait", "40"]
+    run = at_the_node(*words, "--json", "--all")
+    assert (run.returncode, run.stderr) == (0, "")
+    told = json.loads(run.stdout)
+    first = told["solutions"][0]
+    assert told["status"] == "reached" and first["distance"] < 1e-6
+    assert first["way"][0] == [0.0, 0.0935, math.radians(100.0), 0.2085]
+    sent = at_the_node("send", *map("{}={!r}".format, first["joints"]["name"], first["joints"]["position"]), "--json")
+    assert json.loads(sent.stdout)["tip"]["position"] == pytest.approx([0.085, 0.01, -0.035], abs=1.2e-5)
+    text = at_the_node(*words, *WORDS, "--degrees", "--tangent", "1", "0", "0")
+    assert text.returncode == 1  # two tubes meet no direction beside a place
+    assert re.search(r"^closest +tip [0-9.e-]+ mm off, [0-9.e-]+ rad turned", text.stdout)
+    assert re.search(r"^outer_rotation +[0-9.-]+ deg", text.stdout, re.MULTILINE) and "\nway " in text.stdout
+
+
 def test_the_service_refuses_with_exit_code_1(peer):
     run = at_the_node("solve", *WORDS[:3])
     assert run.returncode == 1
     assert run.stdout.startswith("bad_input  missing_joint: ")
+    run = at_the_node("inverse", "--position", "0.1", "0", "0", *WORDS[:3])
+    assert run.returncode == 1
+    assert run.stdout.startswith("bad_input  missing_joint: ")
+    run = at_the_node("inverse", "--position", "0.1", "0", "0", "--orientation", "0", "0", "0", "0")
+    assert run.returncode == 1
+    assert run.stdout == "bad_input  out_of_limits: target.orientation: expected a unit quaternion, got norm 0\n"
 
 
 @pytest.mark.parametrize("command", ["send", "solve"])

@@ -19,7 +19,7 @@ from ctr_pvs_interfaces.msg import EquilibriumStatus
 from ctr_pvs_ros.node import CATCH_UP_PERIOD
 from ctr_pvs_ros.node import EquilibriumNode
 from ctr_pvs_ros.process import share_file
-from ctr_pvs_ros.service.jobs import Job
+from ctr_pvs_ros.service.jobs import SolveJob
 from ctr_pvs_ros.service.jobs import do
 from ctr_pvs_ros.service.jobs import robot_of
 from ctr_pvs_ros.tip_servo import TRIES
@@ -90,7 +90,15 @@ def test_an_answer_that_cannot_be_sent_is_told_and_the_stream_goes_on(node, monk
 
 
 def test_the_service_answers_when_its_solver_is_broken():
-    job = Job(7, np.zeros(2), np.zeros(2), Loads(), "cold", 60, time.monotonic() + 1.0)
+    job = SolveJob(
+        number=7,
+        alpha=np.zeros(2),
+        D=np.zeros(2),
+        loads=Loads(),
+        start="cold",
+        poses=60,
+        deadline=time.monotonic() + 1.0,
+    )
     solved = do(BrokenSolver(), job)
     assert solved.number == 7 and solved.numbers is None
     assert solved.status == "not_converged"

@@ -8,6 +8,7 @@ import pytest
 from rclpy.qos import DurabilityPolicy
 from rclpy.qos import ReliabilityPolicy
 
+from ctr_pvs import InverseStatus
 from ctr_pvs import Status
 from ctr_pvs_ros.inputs.commands import Reason
 from ctr_pvs_ros.inputs.poses import PoseReason
@@ -117,17 +118,27 @@ def test_diagnostics_keys(peer):
 def test_status_codes_and_reasons():
     told = {code(row[0])[0]: row[1] == "yes" for row in table("status")}
     assert told == {**{status.value: status.success for status in Status}, BAD_INPUT: False}
+    told = {code(row[0])[0]: row[1] == "yes" for row in table("search")}
+    assert told == {**{status.value: status is InverseStatus.REACHED for status in InverseStatus}, BAD_INPUT: False}
     assert [code(row[0])[0] for row in table("reason")] == [reason.value for reason in Reason]
     assert [code(row[0])[0] for row in table("refusal")] == [reason.value for reason in WrenchReason]
     assert [code(row[0])[0] for row in table("pose refused")] == [reason.value for reason in PoseReason]
     assert [code(row[0])[0] for row in table("withheld")] == [SNAP_HELD, MARGIN_STOP, INTERNAL_ERROR]
 
 
-@pytest.mark.parametrize(("file", "least"), [("srv/SolveEquilibrium.srv", 15), ("msg/EquilibriumStatus.msg", 12)])
+@pytest.mark.parametrize(
+    ("file", "least"),
+    [
+        ("srv/SolveEquilibrium.srv", 15),
+        ("srv/SolveInverse.srv", 15),
+        ("msg/EquilibriumStatus.msg", 12),
+        ("msg/InverseSolution.msg", 6),
+    ],
+)
 def test_fields_of_our_own_types(file, least):
     text = DOCUMENT.read_text(encoding="utf-8")
     definition = (DOCUMENT.parents[1] / "ctr_pvs_interfaces" / file).read_text(encoding="utf-8")
-    fields = re.findall(r"^[\w/]+(?:\[\])? (\w+)(?: = \d+ .*)?$", definition, re.MULTILINE)
+    fields = re.findall(r"^[\w/]+(?:\[\])? (\w+)(?: = \d+ .*| \S+)?$", definition, re.MULTILINE)
     assert len(fields) > least
     missing = [field for field in fields if f"`{field}`" not in text]
     assert missing in ([], ["header"])

@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from geometry_msgs.msg import PoseStamped
+from sensor_msgs.msg import JointState
 
 from ctr_pvs import EquilibriumSolver
 from ctr_pvs import load_robot
@@ -17,6 +18,7 @@ from ros.load import joint_state
 from ros.load import stamp_of
 
 START = [0.0, 0.09, 1.0, 0.17]
+OTHER = [0.4, 0.1, 1.1, 0.18]
 ON_A_KINK = [0.0, 0.0935, 1.0, 0.1705]  # a segment of the outer tube ends on the orifice
 COUNT, RADIUS = 100, 0.002  # poses on a circle of so many metres
 TIMEOUT = 10.0
@@ -37,13 +39,14 @@ class Tip:
     def _keep(self, status):
         self.statuses[stamp_of(status)] = status
 
-    def to(self, position, frame=""):
+    def to(self, position, frame="", orientation=(0.0, 0.0, 0.0, 1.0)):
         """The status of a pose."""
         self._stamp += 1
         message = PoseStamped()
         message.header.stamp.nanosec, message.header.frame_id = self._stamp, frame
-        place = message.pose.position
+        place, turn = message.pose.position, message.pose.orientation
         place.x, place.y, place.z = map(float, position)
+        turn.x, turn.y, turn.z, turn.w = map(float, orientation)
         self._poses.publish(message)
         return self._status()
 
@@ -77,6 +80,21 @@ def where(tip):
     tip.peer.wait(lambda: bool(tips), "tip")
     place = tips[-1].pose.position
     return np.array([place.x, place.y, place.z])
+
+
+def joints(tip):
+    """Of the last answer."""
+    told = tip.peer.subscribe(JointState, "setpoint_js")
+    tip.peer.wait(lambda: bool(told), "joints")
+    return np.array(told[-1].position)
+
+
+def tip_orientation(tip):
+    """Of the last answer."""
+    tips = tip.peer.subscribe(PoseStamped, "setpoint_cp")
+    tip.peer.wait(lambda: bool(tips), "tip")
+    turn = tips[-1].pose.orientation
+    return turn.x, turn.y, turn.z, turn.w
 
 
 def test_before_the_first_answer_a_pose_is_refused(tip):
@@ -125,18 +143,66 @@ def test_switching_does_not_jump(tip):
     assert np.linalg.norm(where(tip) - there) < 1e-6
 
 
-def test_bad_poses_change_nothing(tip):
+@pytest.mark.parametrize("moved", [0.0, 1e-4])
+def test_each_input_goes_on_from_where_the_other_has_led(tip, moved):
+    """Of the many commands for a place, poses choose the one near the last answer, not near their own last one."""
     tip.joints_to(START)
     there = where(tip)
-    for position, frame, reason in (
-        ([0.1, math.nan, 0.0], "", "non_finite"),
-        (there, "world", "unknown_frame"),
-        ([99.0, 0.0, 0.0], "", "out_of_limits"),
-    ):
-        status = tip.to(position, frame)
+    for share in np.linspace(0.0, 1.0, 40):  # poses lead far away, by other joints than the command that comes then
+        tip.to(there + share * np.array([-0.02, 0.01, 0.01]))
+    astray = joints(tip)
+    tip.joints_to(OTHER)
+    status = tip.to(where(tip) + moved * np.array([0.0, 1.0, 0.0]))
+    assert status.outcome == EquilibriumStatus.ACCEPTED
+    step = np.abs(joints(tip) - OTHER)
+    assert step[0::2].max() < 0.1 and step[1::2].max() < 2e-3
+    assert np.abs(astray - OTHER)[0::2].max() > 0.2 or np.abs(astray - OTHER)[1::2].max() > 4e-3
+    on = joints(tip)
+    tip.joints_to(on)  # and a command for where poses have led moves nothing
+    assert np.array_equal(joints(tip), on)
+
+
+def check_refused(tip, bad):
+    tip.joints_to(START)
+    there, stand = where(tip), joints(tip)
+    for position, frame, orientation, reason in bad:
+        status = tip.to(position, frame, orientation)
         assert (status.outcome, status.reason) == (EquilibriumStatus.REFUSED, reason)
         assert math.isnan(status.tip_distance)
-    assert np.array_equal(where(tip), there)
+    assert np.array_equal(where(tip), there) and np.array_equal(joints(tip), stand)
+    assert tip.to(there, "ctr_base", tip_orientation(tip)).tip_distance < 1e-9  # the next good one is answered
+
+
+def test_bad_poses_change_nothing(tip):
+    good, plain = [0.1, 0.0, 0.0], (0.0, 0.0, 0.0, 1.0)
+    check_refused(
+        tip,
+        [
+            ([0.1, math.nan, 0.0], "", plain, "non_finite"),
+            ([-math.inf, 0.0, 0.0], "", plain, "non_finite"),
+            (good, "world", plain, "unknown_frame"),
+            ([99.0, 0.0, 0.0], "", plain, "out_of_limits"),
+            ([1e300, 1e300, 0.0], "", plain, "out_of_limits"),
+        ],
+    )
+    assert tip.to(where(tip), "", (0.0,) * 4).outcome == EquilibriumStatus.ACCEPTED  # no orientation is asked for
+
+
+@pytest.mark.parametrize("goal", ["tangent", "orientation"])
+def test_bad_orientations_change_nothing_where_they_count(tip, goal):
+    assert tip.peer.set_parameter("servo_cp_goal", goal).successful
+    try:
+        check_refused(
+            tip,
+            [
+                ([0.1, 0.0, 0.0], "", (0.0,) * 4, "out_of_limits"),
+                ([0.1, 0.0, 0.0], "", (0.0, 0.0, 0.0, 2.0), "out_of_limits"),
+                ([0.1, 0.0, 0.0], "", (1e300, 0.0, 0.0, 1e300), "out_of_limits"),
+                ([0.1, 0.0, 0.0], "", (0.0, math.nan, 0.0, 1.0), "non_finite"),
+            ],
+        )
+    finally:
+        assert tip.peer.set_parameter("servo_cp_goal", "position").successful
 
 
 def test_out_of_reach_the_tip_comes_as_near_as_it_can(tip):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import tracemalloc
 
 import numpy as np
@@ -247,6 +248,40 @@ def test_a_row_has_every_output(seed_robot):
         assert answer.stability_margin == pytest.approx(batch.stability_margin[row], abs=1e-8)
         assert answer.error_estimate == pytest.approx(batch.error_estimate[row], rel=1e-5)
         assert len(answer.snaps) == len(single.snaps)
+
+
+@pytest.mark.parametrize("loaded", [False, True], ids=["unloaded", "loaded"])
+@pytest.mark.parametrize("tubes", [1, 2, 3])
+def test_margins_and_forces_noted_on_the_way_are_those_of_single_answers(tubes, loaded):
+    """Bit by bit, rows that snap and rows that the robot cannot take among them."""
+    rng = np.random.default_rng([tubes, loaded, 88])
+    robot = random_robot(rng, tubes, strength=2.0)
+    alpha, D = many_rows(rng, robot, 6 if loaded else 20, 4.0)
+    D[1] = -1.0
+    force = rng.uniform(-0.1, 0.1, (len(D), 3)) if loaded else None
+    noted, asked = (solved(robot, alpha, D, tip_force=force, complete=complete) for complete in (True, False))
+    assert noted.stability_margin.tobytes() == asked.stability_margin.tobytes()
+    assert noted.force.tobytes() == asked.force.tobytes()
+    assert np.isnan(noted.force[1]).all() and np.isfinite(noted.force).all(axis=1).sum() > len(D) // 2
+    row = int(np.flatnonzero(noted.success)[-1])
+    assert noted.force[row].tobytes() == noted[row].force.tobytes()
+
+
+def test_forces_noted_on_the_way_are_of_the_force_model(seed_robot):
+    solver, D = EquilibriumSolver(seed_robot, 1e-6, force_model="renda2021"), [0.15, 0.25]
+    batch = solver.solve_batch([[0.0, 1.2]], [D], complete=True)
+    assert batch.force[0].tobytes() == solver.solve([0.0, 1.2], D, "cold").force.tobytes()
+    assert np.abs(batch.force[0] - solved(seed_robot, [[0.0, 1.2]], [D]).force[0]).max() > 1e-3
+
+
+def test_a_pickled_solver_gives_the_same_bits(seed_robot):
+    solver = EquilibriumSolver(seed_robot, 1e-6)
+    solver.solve([0.0, 1.0], PARTIAL)
+    other = pickle.loads(pickle.dumps(solver))
+    for start in ("warm", "cold"):
+        here, there = (each.solve([0.0, 1.1], PARTIAL, start) for each in (solver, other))
+        assert here.state.unknowns.tobytes() == there.state.unknowns.tobytes()
+        assert here.state.tip.tobytes() == there.state.tip.tobytes()
 
 
 def test_tubes_that_do_not_couple():

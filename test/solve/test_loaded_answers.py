@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from elastica import side_force_elastica
 from loaded_cases import CASES
 from loaded_cases import Case
 from random_loads import random_loads
 from random_robots import random_D
 from random_robots import random_robot
-from scipy.special import ellipe
-from scipy.special import ellipeinc
-from scipy.special import ellipk
-from scipy.special import ellipkinc
 
 from ctr_pvs import EquilibriumSolver
 from ctr_pvs import Robot
@@ -80,13 +77,7 @@ def values_tip(case: Case) -> np.ndarray:
 
 @pytest.mark.parametrize("angle", [0.2, 0.8, 1.3])
 def test_elastica_under_a_side_force(angle: float):
-    """K. E. Bisshopp, D. C. Drucker, "Large deflection of cantilever beams" (1945), in elliptic integrals."""
-    p = np.sqrt(0.5 * (1.0 + np.sin(angle)))
-    start = np.arcsin(1.0 / (p * np.sqrt(2.0)))
-    lam = ellipk(p**2) - ellipkinc(start, p**2)  # L sqrt(P / K)
-    away = LENGTH * (1.0 - 2.0 / lam * (ellipe(p**2) - ellipeinc(start, p**2)))
-    along = LENGTH * np.sqrt(2.0 * np.sin(angle)) / lam
-    P = K * (lam / LENGTH) ** 2
+    P, along, away = side_force_elastica(angle, LENGTH, K)
     solver = EquilibriumSolver(ROD, 1e-9)
     for y, z in ((0.0, 1.0), (0.6, -0.8)):
         answer = solver.solve([0.0], [GUIDE], "cold", loads=Loads(tip_force=(0.0, y * P, z * P)))

@@ -51,6 +51,19 @@ def test_fig4_snaps_at_its_folds(seed_robot, D, fold):
         assert answer.stability_margin > 0.5
 
 
+def test_a_solver_that_halts_ends_where_others_snap_and_elsewhere_answers_as_they_do(seed_robot):
+    solver = EquilibriumSolver(seed_robot, tolerance=1e-7)
+    begin = solver.solve([0.0, np.radians(270.0)], FULL)
+    halting = solver.fork(begin, halts=True)
+    ended = halting.solve([0.0, np.radians(290.0)], FULL)
+    assert ended.status is Status.NO_STABLE_EQUILIBRIUM and not ended.success and ended.snaps == ()
+    assert "the stable branch ends" in ended.message
+    assert solver.fork(begin).solve([0.0, np.radians(290.0)], FULL).status is Status.SNAP
+    one, other = (each.solve([0.0, np.radians(281.0)], FULL) for each in (halting, solver))
+    assert one.status is Status.OK and (one.tip.position == other.tip.position).all()
+    assert halting.fork(one).solve([0.0, np.radians(290.0)], FULL).snaps == ()  # forks halt, too
+
+
 def test_margin_and_early_warning_of_fig4(seed_robot):
     """The margin stands at 1 until late; the reserve falls from the start, to 0.086 at 280 deg."""
     solver = EquilibriumSolver(seed_robot, tolerance=1e-8)

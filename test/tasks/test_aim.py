@@ -24,9 +24,9 @@ def answer():
 def aims(answer):
     """At the tip itself but for the position: there all rates are exact."""
     position, orientation = answer.tip.position + 0.01, answer.tip.orientation
-    yield Aim(position, None, None, 1e-6, 1e-4, 0.02)
-    yield Aim(position, [1.0, 0.3, 0.2], None, 1e-6, 1e-4, 0.02)
-    yield Aim(position, None, orientation, 1e-6, 1e-4, 0.02)
+    yield Aim(position)
+    yield Aim(position, [1.0, 0.3, 0.2])
+    yield Aim(position, None, orientation)
 
 
 @pytest.mark.parametrize("which", range(3))
@@ -44,16 +44,16 @@ def test_rates_are_those_of_differences(answer, which):
 
 def test_the_tip_itself_is_met_and_angles_are_told(answer):
     tip = answer.tip
-    assert Aim(tip.position, None, tip.orientation, 1e-9, 1e-7, 0.02).met(answer)
+    assert Aim(tip.position, None, tip.orientation, 1e-9, 1e-7).met(answer)
     turn = 0.3
     turned = quaternion_product(np.array([0.0, np.sin(turn / 2), 0.0, np.cos(turn / 2)]), tip.orientation)
     for sign in (1.0, -1.0):  # a quaternion and its negative are one orientation
-        aim = Aim(tip.position, None, sign * turned, 1e-6, 1e-4, 0.02)
+        aim = Aim(tip.position, None, sign * turned)
         assert aim.angle(answer) == pytest.approx(turn, abs=1e-12) and not aim.met(answer)
     tangent = tangent_of(tip.orientation)
     across = np.cross(tangent, [0.0, 0.0, 1.0])
     across /= np.linalg.norm(across)
-    aim = Aim(tip.position, np.cos(turn) * tangent + np.sin(turn) * across, None, 1e-6, 1e-4, 0.02)
+    aim = Aim(tip.position, np.cos(turn) * tangent + np.sin(turn) * across)
     assert aim.angle(answer) == pytest.approx(turn, abs=1e-12)
 
 
@@ -63,7 +63,7 @@ def test_a_turn_of_all_tubes_turns_the_tip(answer):
     position, orientation = turned_about_x(np.array([turn]), answer.tip.position[None], answer.tip.orientation[None])
     assert position[0] == pytest.approx(other.tip.position, abs=1e-9)
     assert abs(orientation[0] @ other.tip.orientation) == pytest.approx(1.0, abs=1e-9)
-    aim = Aim(other.tip.position, None, None, 1e-6, 1e-4, 0.02)
+    aim = Aim(other.tip.position)
     assert float(aim.turn_from(answer.tip.position)) == pytest.approx(turn, abs=1e-7)
 
 
@@ -79,4 +79,4 @@ def test_a_turn_of_all_tubes_turns_the_tip(answer):
 )
 def test_what_is_no_aim_is_refused(words):
     with pytest.raises(FieldError):
-        Aim(*words, 1e-6, 1e-4, 0.02)
+        Aim(*words)

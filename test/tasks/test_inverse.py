@@ -3,6 +3,7 @@ search."""
 
 from __future__ import annotations
 
+import math
 import time
 
 import numpy as np
@@ -19,6 +20,7 @@ from ctr_pvs import load_robot
 from ctr_pvs.errors import FieldError
 from ctr_pvs.tasks.aim import tangent_of
 from ctr_pvs.tasks.bounds import Bounds
+from ctr_pvs.tasks.table import Table
 
 TOLERANCE, FLOOR = 1e-7, 0.1
 
@@ -174,6 +176,28 @@ def test_all_solutions_differ_and_meet_the_target():
         for other in every[:index]:
             turn = np.abs((one.alpha - other.alpha + np.pi) % (2.0 * np.pi) - np.pi).max()
             assert turn > 0.1 or np.abs(one.D - other.D).max() > 0.003
+
+
+def test_all_solutions_of_a_target_out_of_reach_are_its_closest_point():
+    robot = load_robot("renda2021")
+    solver = EquilibriumSolver(robot, 1e-6)
+    one, every = (solver.inverse([0.35, 0.05, 0.0], all=each) for each in (False, True))
+    assert every.status is InverseStatus.CLOSEST and every.others == ()
+    assert every.distance < 1.001 * one.distance
+
+
+def test_a_table_of_starts_that_is_not_finished_in_time_is_gone_on_with():
+    robot = load_robot("renda2021")
+    solver, bounds = EquilibriumSolver(robot, 1e-6), Bounds(robot, None)
+    at_once, bit_by_bit = Table(solver, bounds), Table(solver, bounds)
+    at_once.fill(math.inf)
+    sizes = [0]
+    while len(bit_by_bit.x) < len(at_once.x):
+        bit_by_bit.fill(time.monotonic() + 1e-3)
+        sizes.append(len(bit_by_bit.x))
+    assert len(set(sizes)) > 3 and sizes == sorted(sizes)
+    for name in ("x", "position", "orientation"):
+        assert (getattr(bit_by_bit, name) == getattr(at_once, name)).all()
 
 
 def test_the_search_sets_out_from_the_last_answer_and_leaves_it():

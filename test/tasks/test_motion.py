@@ -16,6 +16,7 @@ from ctr_pvs import Status
 from ctr_pvs import Tube
 from ctr_pvs import load_robot
 from ctr_pvs.errors import FieldError
+from ctr_pvs.tasks.bounds import Bounds
 from ctr_pvs.tasks.motion import Polyline
 from ctr_pvs.tasks.motion import distances
 
@@ -52,6 +53,39 @@ def test_the_tip_stays_on_the_path(start, loads):
     assert distances(path, np.array(tips)).max() < 1.1 * TOLERANCE  # it comes to all corners
     assert motion.deviation.max() <= TOLERANCE
     assert motion.progress[-1] == motion.length == pytest.approx(0.01 + np.hypot(0.004, 0.006))
+
+
+def across_flush_tips(rng, robot, solver):
+    """Two answers: with one tube's tip 4 mm out of that of the next one outside, and, moved a little, up to 3 mm in."""
+    bounds, N = Bounds(robot, None), robot.n_tubes
+    lengths = np.array([tube.length for tube in robot.tubes])
+    while True:
+        alpha = rng.uniform(-np.pi, np.pi, N)
+        out = np.maximum.accumulate(rng.uniform(bounds.low[N:], bounds.high[N:]))
+        outer = rng.integers(N - 1)
+        out[outer + 1] = lengths[outer + 1] - lengths[outer] + out[outer] - 0.004
+        within = out.copy()
+        within[outer + 1] += 0.004 + 0.003 * rng.random()
+        within[outer] = np.clip(within[outer] + 0.004 * rng.normal(), bounds.low[N + outer], bounds.high[N + outer])
+        turned = alpha + 0.1 * rng.normal(size=N)
+        if bounds.contains(alpha, out) and bounds.contains(turned, within):
+            here = solver.solve(alpha, out, start="cold")
+            if here.status is Status.OK and here.stability_margin > 0.5:
+                there = solver.fork(here).solve(turned, within)
+                if there.status is Status.OK and there.stability_margin > 0.5:
+                    return here, there
+
+
+@pytest.mark.parametrize("name", ["renda2021", "three_tubes"])
+def test_paths_are_followed_where_the_tip_goes_from_one_tube_to_another(name):
+    """Rates jump there: some of these motions come to rest on the kink where descents do not slide along it."""
+    rng, robot = np.random.default_rng(7), load_robot(name)
+    solver = EquilibriumSolver(robot, 1e-7)
+    for _ in range(60):
+        here, there = across_flush_tips(rng, robot, solver)
+        motion = solver.motion([here.tip.position, there.tip.position], start=here)
+        assert motion.success, motion.message
+        assert motion.tip[-1] == pytest.approx(there.tip.position, abs=1e-5)
 
 
 def test_rates_are_kept_and_one_of_them_is_used_up(start):

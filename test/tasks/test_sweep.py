@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 import itertools
+import multiprocessing
+import threading
+from concurrent.futures import Executor
+from concurrent.futures import Future
+from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
 import pytest
@@ -13,6 +18,7 @@ from ctr_pvs import Status
 from ctr_pvs import load_robot
 from ctr_pvs.errors import CommandError
 from ctr_pvs.robot.loads import Loads
+from ctr_pvs.tasks import sweep as module
 from ctr_pvs.tasks.sweep import STATUSES
 from ctr_pvs.tasks.sweep import Grid
 from ctr_pvs.tasks.sweep import Layout
@@ -73,6 +79,56 @@ def test_the_same_bits_however_cut(force):
         part = every(robot, grid, first, chunk)
         assert part.numbers.tobytes() == whole.numbers[first:].tobytes()
         assert part.codes.tolist() == whole.codes[first:].tolist()
+
+
+def test_other_processes_give_the_same_bits(seed_robot):
+    """Any executor will do: here one whose processes know nothing but what is sent to them."""
+    grid = Grid(seed_robot, ANGLES, BASES)
+    with ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as pool:
+        rows = joined(grid.layout, list(sweep(EquilibriumSolver(seed_robot), grid, chunk=3, workers=pool)))
+    here = every(seed_robot, grid)
+    assert rows.numbers.tobytes() == here.numbers.tobytes() and rows.codes.tolist() == here.codes.tolist()
+
+
+class LateFirst(Executor):
+    """Answers what was handed in last before the rest; notes how much was under way."""
+
+    def __init__(self):
+        self.waiting, self.most, self.cancelled = [], 0, 0
+
+    def submit(self, fn, /, *args, **kwargs):
+        future = Future()
+        future.add_done_callback(lambda done: setattr(self, "cancelled", self.cancelled + done.cancelled()))
+        self.waiting.append((future, lambda: fn(*args, **kwargs)))
+        self.most = max(self.most, len(self.waiting))
+        if len(self.waiting) == 1:
+            threading.Timer(0.05, self.answer).start()
+        return future
+
+    def answer(self):
+        while self.waiting:
+            future, work = self.waiting.pop()
+            if future.set_running_or_notify_cancel():
+                future.set_result(work())
+
+
+def test_rows_keep_their_order_whoever_is_first_and_few_are_under_way(seed_robot, monkeypatch):
+    monkeypatch.setattr(module, "AHEAD", 4)
+    monkeypatch.setattr(module, "LOOK", 0.01)
+    pool, grid = LateFirst(), Grid(seed_robot, ANGLES, BASES)
+    parts = list(sweep(EquilibriumSolver(seed_robot), grid, chunk=2, workers=pool))
+    assert joined(grid.layout, parts).numbers.tobytes() == every(seed_robot, grid).numbers.tobytes()
+    assert 1 < pool.most <= 4
+    assert min(map(len, parts)) == 0  # nothing came for a while, and whoever waits was told
+
+
+def test_what_nobody_waits_for_any_more_is_given_up(seed_robot, monkeypatch):
+    monkeypatch.setattr(module, "LOOK", 0.01)
+    pool, grid = LateFirst(), Grid(seed_robot, ANGLES, BASES)
+    rows = sweep(EquilibriumSolver(seed_robot), grid, chunk=1, workers=pool)
+    assert sum(len(part) for part in itertools.islice((part for part in rows if len(part)), 3)) == 3
+    rows.close()
+    assert all(future.cancelled() or future.done() for future, _ in pool.waiting)
 
 
 def test_each_row_has_its_own_force(seed_robot):

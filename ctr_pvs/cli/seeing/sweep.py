@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import csv
 import math
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 from typing import Any
@@ -13,9 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ctr_pvs.cli.command import SUCCESS
 from ctr_pvs.cli.command import declare_robot
-from ctr_pvs.cli.seeing.words import cannot_write
+from ctr_pvs.cli.seeing.answering import answer
+from ctr_pvs.cli.seeing.answering import check_output
+from ctr_pvs.cli.seeing.answering import declare_answering
+from ctr_pvs.cli.seeing.answering import exit_code
 from ctr_pvs.cli.seeing.words import declare_output
 from ctr_pvs.cli.words import UsageError
 from ctr_pvs.cli.words import number
@@ -23,17 +24,11 @@ from ctr_pvs.robot.file import load_robot
 from ctr_pvs.robot.robot import Robot
 
 if TYPE_CHECKING:
-    from ctr_pvs.cli.seeing.tables import Table
-    from ctr_pvs.solve.solver import EquilibriumSolver
     from ctr_pvs.tasks.sweep import Commands
-    from ctr_pvs.tasks.sweep import Rows
 
 Array = NDArray[np.float64]
 
-INTERRUPTED = 130  # as shells have it
 MOST_VALUES = 1_000_000  # of one range
-#: How far a row that is solved again may be from what is kept, as a share of its largest number.
-SAME = 1e-6
 FORCE = ("tip_force_x", "tip_force_y", "tip_force_z")
 
 
@@ -45,7 +40,7 @@ def declare_sweep(subcommands: argparse._SubParsersAction[Any]) -> None:
         help="many commands, a grid or a list, to a table",
         description="Answers many commands, each a cold start, and writes a table: tip position and orientation, "
         "stability margin, torques, forces, status. Ctrl-C keeps what is done; --resume goes on from there.",
-        epilog="Exit codes: 0 every row was answered, with a status of its own; 2 bad input; 130 stopped by Ctrl-C.",
+        epilog="Exit codes: 0 every row was answered, with a status of its own; 2 bad input or no cluster; 130 Ctrl-C.",
     )
     declare_robot(sweep)
     grid = sweep.add_argument_group("a grid", "One word per tube, outermost first: low:high:count, or one value.")
@@ -64,7 +59,7 @@ def declare_sweep(subcommands: argparse._SubParsersAction[Any]) -> None:
     )
     endings = (".csv", ".npz", ".parquet")
     declare_output(sweep, "--output", endings, required=True, help=".csv, .npz, or .parquet (needs pyarrow)")
-    sweep.add_argument("--resume", action="store_true", help="go on after the rows that --output already holds")
+    declare_answering(sweep)
     sweep.set_defaults(run=_sweep)
 
 
@@ -83,21 +78,17 @@ def _values(text: str) -> Array:
 
 def _sweep(arguments: argparse.Namespace) -> int:
     robot = load_robot(arguments.robot)
-    if arguments.output.exists() and not arguments.resume:
-        raise UsageError(f"--output: {arguments.output} is there already: --resume goes on with it, or remove it")
+    check_output(arguments)
     commands = _commands(arguments, robot)
 
     from ctr_pvs.cli.seeing.tables import table_for
-    from ctr_pvs.solve.solver import EquilibriumSolver
+    from ctr_pvs.tasks.sweep import STATUSES
 
-    solver = EquilibriumSolver(robot, tolerance=arguments.tolerance)
     table = table_for(arguments.output, commands.layout)
-    try:
-        if arguments.output.exists():
-            _check_kept(solver, commands, table)
-        return _run(solver, commands, table)
-    except OSError as error:
-        raise cannot_write("--output", error) from error
+    counts = answer(arguments, robot, commands, table)
+    told = ", ".join(f"{count} {name}" for name, count in zip(STATUSES, counts, strict=True) if count)
+    print(f"{table.path}: {table.count} of {len(commands)} rows{'; new: ' + told if told else ''}")
+    return exit_code(arguments, commands, table)
 
 
 def _commands(arguments: argparse.Namespace, robot: Robot) -> Commands:
@@ -142,56 +133,3 @@ def _cell(path: Path, line: int, name: str, text: str | None) -> float:
         return number(text or "")
     except argparse.ArgumentTypeError as error:
         raise UsageError(f"--commands: {path}, line {line}, {name}: {error}") from None
-
-
-def _check_kept(solver: EquilibriumSolver, commands: Commands, table: Table) -> None:
-    """Whether the rows of an earlier run are the first of these commands, and the last of them has the same answer.
-
-    Raises ``UsageError`` where not: rows of two kinds in one file would help nobody.
-    """
-    from ctr_pvs.tasks.sweep import Listed
-    from ctr_pvs.tasks.sweep import sweep
-
-    last: Rows | None = None
-    for rows in table.kept():
-        start, stop = table.count - len(rows), table.count
-        given = commands.rows(start, min(stop, len(commands)))
-        if stop > len(commands) or not np.array_equal(given, rows.numbers[:, commands.layout.commands]):
-            raise UsageError(f"--resume: {table.path} holds other commands")
-        last = rows if len(rows) else last
-    if last is None:
-        return
-    listed = Listed(solver.robot, last.numbers[-1:, commands.layout.commands], "tip_force" in commands.layout.groups)
-    (again,) = sweep(solver, listed)
-    largest = np.nanmax(np.abs(last.numbers[-1]))
-    same = np.allclose(again.numbers[0], last.numbers[-1], rtol=0.0, atol=SAME * largest, equal_nan=True)
-    if not same or again.codes[0] != last.codes[-1]:
-        raise UsageError(f"--resume: {table.path} has another answer in its last row: another robot, or tolerance")
-
-
-def _run(solver: EquilibriumSolver, commands: Commands, table: Table) -> int:
-    """Answers the rows that the table does not have yet."""
-    from ctr_pvs.cli.seeing.progress import Progress
-    from ctr_pvs.cli.seeing.progress import Stop
-    from ctr_pvs.tasks.sweep import STATUSES
-    from ctr_pvs.tasks.sweep import sweep
-
-    total = len(commands)
-    counts = np.zeros(len(STATUSES), dtype=np.int64)
-    progress = Progress(table.count, total)
-    with Stop() as stop:
-        try:
-            for rows in sweep(solver, commands, table.count):
-                table.append(rows)
-                counts += np.bincount(rows.codes, minlength=len(STATUSES))
-                progress.tell(table.count)
-                if stop.asked:
-                    break
-        finally:
-            table.close()
-    told = ", ".join(f"{count} {name}" for name, count in zip(STATUSES, counts.tolist(), strict=True) if count)
-    print(f"{table.path}: {table.count} of {total} rows{'; new: ' + told if told else ''}")
-    if table.count < total:
-        print("ctr-pvs: stopped; --resume goes on", file=sys.stderr)
-        return INTERRUPTED
-    return SUCCESS

@@ -45,12 +45,18 @@ class Table(ABC):
     @abstractmethod
     def close(self) -> None: ...
 
+    @abstractmethod
+    def rows(self) -> Rows:
+        """All of them; call it last."""
+
     def _foreign(self) -> UsageError:
         return UsageError(f"--resume: {self.path} holds no rows of this robot and these options")
 
 
-def table_for(path: Path, layout: Layout) -> Table:
-    """By the file's ending.  Raises ``UsageError`` for Parquet without pyarrow."""
+def table_for(path: Path | None, layout: Layout) -> Table:
+    """By the file's ending; in memory without a file.  Raises ``UsageError`` for Parquet without pyarrow."""
+    if path is None:
+        return MemoryTable(Path(os.devnull), layout)
     ending = path.suffix.lower()
     if ending == ".csv":
         return CsvTable(path, layout)
@@ -113,13 +119,36 @@ class CsvTable(Table):
         if self._file is not None:
             self._file.close()
 
+    def rows(self) -> Rows:
+        return joined(self.layout, list(CsvTable(self.path, self.layout).kept()))
 
-class WholeTable(Table):
-    """Rows in memory, written together."""
+
+class MemoryTable(Table):
+    """Rows in memory only."""
 
     def __init__(self, path: Path, layout: Layout) -> None:
         super().__init__(path, layout)
         self._parts: list[Rows] = []
+
+    def kept(self) -> Iterator[Rows]:
+        yield from ()
+
+    def append(self, rows: Rows) -> None:
+        self._parts.append(rows)
+        self.count += len(rows)
+
+    def close(self) -> None:
+        pass
+
+    def rows(self) -> Rows:
+        return joined(self.layout, self._parts)
+
+
+class WholeTable(MemoryTable):
+    """Rows in memory, written together."""
+
+    def __init__(self, path: Path, layout: Layout) -> None:
+        super().__init__(path, layout)
         self._written = time.monotonic()
 
     def kept(self) -> Iterator[Rows]:
@@ -128,8 +157,7 @@ class WholeTable(Table):
         yield rows
 
     def append(self, rows: Rows) -> None:
-        self._parts.append(rows)
-        self.count += len(rows)
+        super().append(rows)
         if time.monotonic() > self._written + EVERY:
             self.close()
             self._written = time.monotonic()

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import TYPE_CHECKING
 from typing import Any
 
 import numpy as np
 
-from ctr_pvs.cli.command import SUCCESS
 from ctr_pvs.cli.command import declare_robot
+from ctr_pvs.cli.seeing.answering import answer
+from ctr_pvs.cli.seeing.answering import check_output
+from ctr_pvs.cli.seeing.answering import declare_answering
+from ctr_pvs.cli.seeing.answering import exit_code
 from ctr_pvs.cli.seeing.words import cannot_write
 from ctr_pvs.cli.seeing.words import declare_output
 from ctr_pvs.cli.words import UsageError
@@ -18,11 +22,8 @@ from ctr_pvs.cli.words import whole_number
 from ctr_pvs.robot.file import load_robot
 
 if TYPE_CHECKING:
-    from ctr_pvs.solve.solver import EquilibriumSolver
-    from ctr_pvs.tasks.sweep import Commands
     from ctr_pvs.tasks.sweep import Rows
 
-INTERRUPTED = 130  # as shells have it
 MOST, LARGEST_SEED = 10_000_000, 2**53
 EDGES = (1e-6, 1.0)  # m
 
@@ -34,7 +35,8 @@ def declare_workspace(subcommands: argparse._SubParsersAction[Any]) -> None:
         allow_abbrev=False,
         help="where the tip can be: random commands, volume, picture",
         description="Answers random commands, uniform over the robot's limits with the bases in order (a tube without "
-        "limits turns once), and tells how much room the tips fill. Ctrl-C ends with those that are done.",
+        "limits turns once), and tells how much room the tips fill. Ctrl-C ends with those that are done, and "
+        "--resume goes on with those of --output.",
     )
     declare_robot(workspace)
     workspace.add_argument(
@@ -47,18 +49,20 @@ def declare_workspace(subcommands: argparse._SubParsersAction[Any]) -> None:
         "--voxel", type=number, metavar="M", help="edge of the cubes that the volume is counted in [m] (fitting)"
     )
     declare_output(workspace, "--output", (".npz", ".csv"), help="table of all rows, as of sweep: .npz or .csv")
+    declare_answering(workspace)
     declare_output(workspace, "--picture", (".png", ".svg"), help="picture of the tips (needs matplotlib)")
     workspace.set_defaults(run=_workspace)
 
 
 def _workspace(arguments: argparse.Namespace) -> int:
     robot = load_robot(arguments.robot)
+    check_output(arguments)
     if arguments.voxel is not None and not EDGES[0] <= arguments.voxel <= EDGES[1]:
         raise UsageError(f"--voxel: expected an edge from {EDGES[0]:g} to {EDGES[1]:g} m, got {arguments.voxel:g}")
 
+    from ctr_pvs.cli.seeing.tables import table_for
     from ctr_pvs.renda2021.figures import PictureError
     from ctr_pvs.renda2021.figures import empty_figure
-    from ctr_pvs.solve.solver import EquilibriumSolver
     from ctr_pvs.tasks.sweep import Listed
     from ctr_pvs.tasks.workspace import random_commands
 
@@ -67,32 +71,17 @@ def _workspace(arguments: argparse.Namespace) -> int:
             empty_figure((1.0, 1.0))  # before the work, not after it
         except PictureError as error:
             raise UsageError(str(error)) from error
-    solver = EquilibriumSolver(robot, tolerance=arguments.tolerance)
     commands = Listed(robot, random_commands(robot, arguments.count, arguments.seed), False)
-    rows = _answers(solver, commands)
+    table = table_for(arguments.output, commands.layout)
+    answer(arguments, robot, commands, table)
+    rows = table.rows()
     for line in summary(robot.name, rows, arguments.count, arguments.seed, arguments.voxel):
         print(line)
-    _save(arguments, robot.name, rows)
-    return SUCCESS if len(rows) == arguments.count else INTERRUPTED
-
-
-def _answers(solver: EquilibriumSolver, commands: Commands) -> Rows:
-    """The rows that were answered before somebody stopped it."""
-    from ctr_pvs.cli.seeing.progress import Progress
-    from ctr_pvs.cli.seeing.progress import Stop
-    from ctr_pvs.tasks.sweep import joined
-    from ctr_pvs.tasks.sweep import sweep
-
-    parts: list[Rows] = []
-    progress, done = Progress(0, len(commands)), 0
-    with Stop() as stop:
-        for rows in sweep(solver, commands):
-            parts.append(rows)
-            done += len(rows)
-            progress.tell(done)
-            if stop.asked:
-                break
-    return joined(commands.layout, parts)
+    if arguments.output is not None:
+        print(arguments.output)
+    if arguments.picture is not None:
+        _draw(robot.name, rows, arguments.picture)
+    return exit_code(arguments, commands, table)
 
 
 def summary(name: str, rows: Rows, asked: int, seed: int, edge: float | None) -> list[str]:
@@ -122,22 +111,11 @@ def summary(name: str, rows: Rows, asked: int, seed: int, edge: float | None) ->
     ]
 
 
-def _save(arguments: argparse.Namespace, name: str, rows: Rows) -> None:
-    from ctr_pvs.cli.seeing.tables import table_for
+def _draw(name: str, rows: Rows, path: Path) -> None:
     from ctr_pvs.cli.seeing.workspace_figure import save_workspace
 
     try:
-        if arguments.output is not None:
-            arguments.output.unlink(missing_ok=True)
-            table = table_for(arguments.output, rows.layout)
-            table.append(rows)
-            table.close()
-            print(arguments.output)
-    except OSError as error:
-        raise cannot_write("--output", error) from error
-    try:
-        if arguments.picture is not None:
-            save_workspace(name, rows, arguments.picture)
-            print(arguments.picture)
+        save_workspace(name, rows, path)
     except OSError as error:
         raise cannot_write("--picture", error) from error
+    print(path)

@@ -1,4 +1,4 @@
-"""Single solves in a process of their own, which knows nothing of ROS: jobs come in and what came of them goes out.
+"""Jobs in a process of their own, which knows nothing of ROS: they come in and what came of them goes out.
 
 The node starts it. It does one job after the other, in the order in which they come, each within its deadline. The end
 of the connection to the node is its end, whatever it is doing.

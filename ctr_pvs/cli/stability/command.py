@@ -17,7 +17,7 @@ from ctr_pvs.robot.file import load_robot
 from ctr_pvs.robot.robot import Robot
 
 if TYPE_CHECKING:
-    from ctr_pvs.cli.stability_scan import Scene
+    from ctr_pvs.cli.stability.scan import Scene
 
 SUCCESS, NOT_ALL_SOLVED = 0, 4
 MOST_STEPS, MOST_ROWS = 10_000, 1_000
@@ -87,10 +87,10 @@ def _stability(arguments: argparse.Namespace) -> int:
     robot = load_robot(arguments.robot)
 
     # Only here, for they bring the compiler along: see main.
-    from ctr_pvs.cli.stability_figures import save_pictures
-    from ctr_pvs.cli.stability_report import scan_as_json
-    from ctr_pvs.cli.stability_report import scan_as_text
-    from ctr_pvs.cli.stability_scan import scan
+    from ctr_pvs.cli.stability.figures import save_pictures
+    from ctr_pvs.cli.stability.report import scan_as_json
+    from ctr_pvs.cli.stability.report import scan_as_text
+    from ctr_pvs.cli.stability.scan import scan
     from ctr_pvs.renda2021.figures import PictureError
 
     unit = math.pi / 180.0 if arguments.degrees else 1.0
@@ -114,7 +114,7 @@ def _stability(arguments: argparse.Namespace) -> int:
 
 
 def _scene(robot: Robot, arguments: argparse.Namespace, unit: float) -> Scene:
-    from ctr_pvs.cli.stability_scan import Scene
+    from ctr_pvs.cli.stability.scan import Scene
 
     tube = _tube(robot, arguments.tube)
     alpha = [0.0] * robot.n_tubes if arguments.alpha is None else [unit * angle for angle in arguments.alpha]

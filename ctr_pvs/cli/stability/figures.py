@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ctr_pvs.cli.stability_scan import Scan
-from ctr_pvs.cli.stability_scan import SweepSnap
+from ctr_pvs.cli.stability.scan import Scan
+from ctr_pvs.cli.stability.scan import SweepSnap
 from ctr_pvs.renda2021.figures import empty_figure
 from ctr_pvs.renda2021.figures import make_folder
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ctr_pvs.cli.stability_scan import Scan
+from ctr_pvs.cli.stability.scan import Scan
 from ctr_pvs.oracles.two_tubes import critical_lambda
 from ctr_pvs.renda2021.columns import aligned
 from ctr_pvs.robot.plausibility import implausible
