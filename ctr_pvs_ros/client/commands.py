@@ -20,6 +20,8 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.validate_node_name import validate_node_name
 from sensor_msgs.msg import JointState
 
+from ctr_pvs.cli.live.view import address_of
+from ctr_pvs.cli.live.view import new_server
 from ctr_pvs.cli.words import UsageError
 from ctr_pvs_interfaces.srv import SolveEquilibrium
 from ctr_pvs_interfaces.srv import SolveInverse
@@ -120,6 +122,24 @@ def _watch(node: Node, arguments: argparse.Namespace) -> int:
     return ANSWERED
 
 
+def _view(node: Node, arguments: argparse.Namespace) -> int:
+    server = new_server(arguments.host, arguments.port, f"ctr_client: {arguments.node}")
+
+    from ctr_pvs.cli.live.followed import FollowedPage
+    from ctr_pvs_ros.client.follower import Follower
+
+    follower = Follower(node, arguments.node)
+    page = FollowedPage(server, follower.name, arguments.largest_force)
+    try:
+        print(f"{follower.name}: {address_of(server)} (Ctrl-C ends)", flush=True)
+        follower.show_on(page)
+    except KeyboardInterrupt:
+        pass
+    finally:
+        page.stop()
+    return ANSWERED
+
+
 def _solve(node: Node, arguments: argparse.Namespace) -> int:
     client = ServiceClient(node, arguments.node)
     _find(client.wait_for_services, arguments.wait)
@@ -169,4 +189,4 @@ def _tip_wrench(arguments: argparse.Namespace) -> Wrench:
     return Wrench(force=force, torque=moment)
 
 
-RUN = {"send": _send, "watch": _watch, "solve": _solve, "inverse": _inverse}
+RUN = {"send": _send, "watch": _watch, "view": _view, "solve": _solve, "inverse": _inverse}

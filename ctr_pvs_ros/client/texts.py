@@ -68,6 +68,13 @@ def answered(status: EquilibriumStatus) -> bool:
     return outcome_of(status) in ANSWERED
 
 
+def status_in_words(status: EquilibriumStatus) -> str:
+    """What became of a command, without its numbers."""
+    outcome, message = outcome_of(status), status.message
+    said = status.reason == outcome or message.startswith(f"{status.reason}: ")
+    return f"{outcome}: {'' if said else f'{status.reason}: '}{message}{f'; {status.hint}' if status.hint else ''}"
+
+
 def status_as_text(
     status: EquilibriumStatus, tip: PoseStamped | None, joints: JointState | None, degrees: bool = False
 ) -> str:

@@ -6,6 +6,7 @@ import argparse
 import math
 from collections.abc import Sequence
 
+from ctr_pvs.cli.live.view import declare_page
 from ctr_pvs.cli.version import declare_version
 from ctr_pvs.cli.words import Parser
 from ctr_pvs.cli.words import UsageError
@@ -23,11 +24,11 @@ Joint = tuple[str, float]
 def parse(words: Sequence[str]) -> argparse.Namespace:
     """The words after the program's name; raises ctr_pvs.cli's UsageError.
 
-    The result has `command`, which is send, watch, solve or inverse, and what that takes; `joints` are in rad and m;
-    for inverse also `goal` and `orientation`, as SolveInverse wants them.
+    The result has `command`, which is send, watch, view, solve or inverse, and what that takes; `joints` are in rad
+    and m; for inverse also `goal` and `orientation`, as SolveInverse wants them.
     """
     arguments = _parser().parse_args(shielded(_joints_first(words)))
-    if arguments.command != "watch" and arguments.degrees:
+    if "joints" in arguments and arguments.degrees:
         arguments.joints = [_in_radians(joint) for joint in arguments.joints]
     if arguments.command == "inverse":
         arguments.goal = "tangent" if arguments.tangent else "orientation" if arguments.orientation else "position"
@@ -81,10 +82,14 @@ def _parser() -> Parser:
     subcommands = parser.add_subparsers(metavar="SUBCOMMAND", required=True, dest="command")
     send = _declared(subcommands, "send", "one command on servo_jp, and what the node says of it")
     watch = _declared(subcommands, "watch", "a line for each command or wrench as the node tells of it, until Ctrl-C")
+    view = _declared(subcommands, "view", "the tubes as the node moves them, on a page in a browser, until Ctrl-C")
     solve = _declared(subcommands, "solve", "one equilibrium from ~/solve, beside the stream of commands")
     inverse = _declared(subcommands, "inverse", "the command that brings the tip to a place, and a way, from ~/inverse")
     for subcommand in (send, solve):
         _declare_joints(subcommand, "+", "<tube>_rotation [rad] or <tube>_translation [m]")
+    for subcommand in (send, watch, solve, inverse):
+        subcommand.add_argument("--json", action="store_true", help="one JSON object a line; SI units, null: not known")
+    declare_page(view, "that has the longest arrow")
     _declare_joints(inverse, "*", "where the way begins (none: the stream's last answer)")
     _declare_place(inverse)
     watch.add_argument("--count", type=whole_number(1, 10**9), metavar="N", help="end after so many lines")
@@ -123,7 +128,6 @@ def _declared(subcommands: argparse._SubParsersAction[Parser], name: str, text: 
     subcommand = subcommands.add_parser(name, allow_abbrev=False, help=text, description=f"{text}.", epilog=EXIT_CODES)
     subcommand.add_argument("--namespace", default="", metavar="NS", help="namespace of the node (none)")
     subcommand.add_argument("--node", default="ctr_equilibrium", metavar="NAME", help="name of the node (%(default)s)")
-    subcommand.add_argument("--json", action="store_true", help="one JSON object a line; SI units, null: not known")
     return subcommand
 
 

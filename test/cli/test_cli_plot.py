@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from ctr_pvs import EquilibriumSolver
 from ctr_pvs import Loads
@@ -63,6 +64,8 @@ def test_the_page_is_whole_and_holds_the_answer(capsys, tmp_path):
     assert data["tip"] == pytest.approx(1e3 * answer.tip.position, abs=1e-3)
     assert data["tubes"][1]["points"][-1] == pytest.approx(data["tip"], abs=1e-3)
     assert data["tubes"][0]["diameter"] == pytest.approx(2.39)
+    outer, inner = (np.array(tube["twisting"], dtype=float) for tube in data["tubes"])
+    assert np.nansum([outer, inner], axis=0) == pytest.approx(data["twisting"], abs=2e-3)  # N mm, with three decimals
     assert data["tubes"][0]["twist"][-1] is None and data["tubes"][1]["twist"][-1] is not None
 
 
@@ -89,6 +92,41 @@ def test_curvature_under_a_tip_force_is_that_of_a_cantilever():
     assert shown.curvature == pytest.approx(1e-3 * (0.1 - middle) / 0.02, abs=2e-5)
     assert shown.tubes[0].diameter == pytest.approx(5e-4)
     assert "made up: rod" in shown.told[-1]
+
+
+LOADS = (
+    Loads(tip_force=(0.1, -0.8, 0.3)),
+    Loads(tip_force=(0.0, 0.3, 0.0), tip_moment=(0.01, 0.0, -0.02)),
+    Loads(),
+)
+
+
+@pytest.mark.parametrize("loads", LOADS, ids=["force", "moment too", "none"])
+def test_moments_balance_the_loads_beyond(seed_robot, loads):
+    """Statics of the part beyond a cut, whatever the tubes inside it do: M(s) = M_tip + (p_tip - p(s)) x F."""
+    answer = EquilibriumSolver(seed_robot, 1e-8).solve([0.3, 2.0], [0.0935, 0.1705], loads=loads)
+    shown = drawn(seed_robot, answer)
+    middle = answer.backbone_at(0.5 * (shown.s[1:] + shown.s[:-1]))
+    tangent = Rotation.from_quat(middle.orientation).as_matrix()[:, :, 0]
+    expected = np.cross(answer.tip.position - middle.position, loads.tip_force) + loads.tip_moment
+    along = np.einsum("gi,gi->g", expected, tangent)
+    across = np.linalg.norm(expected - along[:, None] * tangent, axis=1)
+    own = np.nanmax(shown.moments.bending)
+    assert own > 0.05  # N m in the tubes, also where they need not hold anything together
+    assert shown.moments.all_bending == pytest.approx(across, abs=2e-4 * own)
+    assert shown.moments.all_twisting == pytest.approx(along, abs=2e-4 * own)
+    force, moment = answer.base_wrench
+    assert force == pytest.approx(loads.tip_force, abs=1e-9)
+    assert shown.moments.all_twisting[0] == pytest.approx(moment[0], abs=1e-2 * own)  # half an interval beyond
+    assert np.isnan(shown.moments.bending[-1]).tolist() == [True, False]
+
+
+def test_the_moment_of_one_rod_is_that_of_a_cantilever():
+    rod = Robot("rod", (Tube("rod", (Segment(0.1, 0.02, 0.015),)),))
+    answer = EquilibriumSolver(rod, 1e-9).solve([0.0], [0.0], loads=Loads(tip_force=(0.0, 1e-3, 0.0)))
+    shown = drawn(rod, answer)
+    middle = 0.5 * (shown.s[1:] + shown.s[:-1])
+    assert shown.moments.bending[:, 0] == pytest.approx(1e-3 * (0.1 - middle), abs=4e-7)
 
 
 def test_all_of_the_shape_is_in_the_picture_and_nothing_shrinks_to_a_line():

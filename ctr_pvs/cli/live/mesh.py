@@ -2,14 +2,43 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
+
+from ctr_pvs.cli.seeing.drawn import DrawnTube
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 #: Corners of a tube's cross section.
 RING = 20
+
+
+@dataclass(frozen=True)
+class Solid:
+    """A tube as triangles: vertices (v, 3) [m], faces (m, 3) their corners, colour red, green, blue from 0 to 255."""
+
+    name: str
+    colour: tuple[int, int, int]
+    vertices: Array
+    faces: Ints
+
+
+def solids(tubes: tuple[DrawnTube, ...]) -> tuple[Solid, ...]:
+    """Those tubes that come out of the orifice."""
+    return tuple(
+        Solid(
+            tube.name,
+            tube.colour,
+            tube_vertices(tube.position, tube.orientation, 0.5 * tube.diameter),
+            tube_faces(len(tube.position)),
+        )
+        for tube in tubes
+        if len(tube.position)
+    )
 
 
 def tube_vertices(position: Array, orientation: Array, radius: float) -> Array:
@@ -24,6 +53,7 @@ def tube_vertices(position: Array, orientation: Array, radius: float) -> Array:
     return np.concatenate([rings.reshape(-1, 3), position[[0, -1]]])
 
 
+@lru_cache(maxsize=8)
 def tube_faces(poses: int) -> Ints:
     """(m, 3) corners of the triangles of ``tube_vertices`` for so many poses, counterclockwise from outside."""
     here = np.arange(RING)

@@ -1,4 +1,4 @@
-"""The page itself: sliders, bars and meshes of viser, which serves them from its own files, without a network."""
+"""The page with sliders; viser serves it from its own files, without a network."""
 
 from __future__ import annotations
 
@@ -10,72 +10,62 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ctr_pvs.cli.live.mesh import tube_faces
-from ctr_pvs.cli.live.mesh import tube_vertices
-from ctr_pvs.cli.live.state import NEAR
-from ctr_pvs.cli.live.state import POSES
+from ctr_pvs.cli.live.mesh import solids
+from ctr_pvs.cli.live.others import Ghost
+from ctr_pvs.cli.live.others import Others
+from ctr_pvs.cli.live.others import Question
+from ctr_pvs.cli.live.readout import MM
+from ctr_pvs.cli.live.readout import Readout
+from ctr_pvs.cli.live.readout import snap_is_near
+from ctr_pvs.cli.live.scene import Scene
+from ctr_pvs.cli.live.searcher import Searcher
+from ctr_pvs.cli.live.state import FRAMES
+from ctr_pvs.cli.live.state import Frame
 from ctr_pvs.cli.live.state import LiveRobot
 from ctr_pvs.cli.live.state import Shown
+from ctr_pvs.cli.live.turns import Turns
 
 if TYPE_CHECKING:
     from viser import ViserServer
 
 Array = NDArray[np.float64]
 
-#: Scene units per metre: viewers are made for things of about one unit.
-UNITS = 10.0
-#: Axes of the frames, the trace, and the arrow of the force at its largest [m].
-AXES, LINE, ARROW = 0.015, 0.0004, 0.03
-RED, GREEN, GREY = (210, 60, 50), (80, 160, 90), (90, 90, 90)
-MM, STEP_ANGLE, STEP_D, STEP_FORCE = 1e3, 0.5, 0.1, 0.01  # deg, mm, N
+STEP_ANGLE, STEP_D, STEP_FORCE = 0.5, 0.1, 0.01  # deg, mm, N
 #: Sliders that are nearer than this to the command are left where they are.
 SAME = 1e-6
-#: The camera's field of view [rad].
-FIELD = 0.8
 #: Limits of sliders are cut to so many decimals.
 DECIMALS = 2
+#: Seconds that a snap is shown for.
+SNAP_TIME = 0.5
+#: Ghosts that are drawn, those of least energy.
+MOST_GHOSTS = 12
 
 
 class Page:
     """Shows ``live`` on ``server``, and moves it with the sliders.
 
     alpha, D, force : sliders [deg], [mm], [N].  Callbacks come in threads of the server, one for each event: one at a
-    time works, one waits and will see the newest values, others have nothing to add.
+    time works, one waits and will see the newest values, others have nothing to add.  What shows a snap ends at once
+    where somebody waits.
     """
 
     def __init__(self, server: ViserServer, live: LiveRobot, largest_force: float) -> None:
         self.server: Any = server  # its types would ask for exact widths of floats
         self.live = live
-        self._working, self._waiting = threading.Lock(), threading.Lock()
+        self._turns, self._waiting = Turns(), threading.Lock()
         self._setting: int | None = None  # the thread that sets sliders itself
-        server.gui.configure_theme(show_logo=False, show_share_button=False)  # nothing that would ask the network
-        self._build_scene()
+        self._question: Question | None = None
+        self._searcher = Searcher(live.robot, live.tolerance, self._found)
+        self.scene = Scene(server, live.shown.tip.position, largest_force)
         self._build_sliders(largest_force)
-        self._build_numbers()
+        self.readout = Readout(server)
         self._build_buttons()
         self.show(live.shown)
 
-    def _build_scene(self) -> None:
-        scene = self.server.scene
-        scene.set_up_direction("+z")
-        tip = UNITS * self.live.shown.tip.position
-        reach = float(np.linalg.norm(tip))
-        camera = self.server.initial_camera
-        camera.look_at, camera.fov = tuple(0.6 * tip), FIELD
-        camera.position = (0.6 * tip[0], 0.6 * tip[1] - 1.9 * reach, 0.6 * tip[2] + 0.9 * reach)
-        floor = (0.0, 0.0, -0.6 * reach)
-        scene.add_grid("/grid", 4.0 * reach, 4.0 * reach, cell_size=0.1, section_size=1.0, position=floor)
-        size: dict[str, Any] = {"axes_length": UNITS * AXES, "axes_radius": UNITS * AXES / 25.0}
-        scene.add_frame("/orifice", **size)
-        self.tip = scene.add_frame("/tip", **size)
-        faces = tube_faces(POSES)
-        self.tubes = [
-            scene.add_mesh_simple(f"/tubes/{tube.name}", np.zeros((faces.max() + 1, 3)), faces, color=tube.colour)
-            for tube in self.live.shown.tubes
-        ]
-        line: dict[str, Any] = {"thickness": UNITS * LINE}
-        self.trace = scene.add_line_segments("/trace", np.zeros((0, 2, 3)), RED, **line)
-        self.arrow = scene.add_line_segments("/tip_force", np.zeros((0, 2, 3)), GREY, thickness=2.0 * UNITS * LINE)
+    def stop(self) -> None:
+        """Ends all that it has started."""
+        self._searcher.stop()
+        self.server.stop()
 
     def _build_sliders(self, largest_force: float) -> None:
         gui, limits, names = self.server.gui, self.live.limits, [tube.name for tube in self.live.robot.tubes]
@@ -93,22 +83,17 @@ class Page:
             ]
         with gui.add_folder("force on the tip [N]"):
             self.force = [gui.add_slider(axis, -largest_force, largest_force, STEP_FORCE, 0.0) for axis in "xyz"]
-        self._largest_force = largest_force
         for slider in (*self.alpha, *self.D, *self.force):
             slider.on_update(self.changed)
-
-    def _build_numbers(self) -> None:
-        gui = self.server.gui
-        self.message = gui.add_markdown("")
-        self.margin_told, self.margin = gui.add_markdown(""), gui.add_progress_bar(0.0)
-        self.reserve_told, self.reserve = gui.add_markdown(""), gui.add_progress_bar(0.0)
-        self.table = gui.add_markdown("")
 
     def _build_buttons(self) -> None:
         gui = self.server.gui
         self.save = gui.add_button("Save the command")
         self.clear = gui.add_button("Clear the trace")
         self.reset = gui.add_button("Reset")
+        self.others = gui.add_checkbox("other equilibria", False)
+        self.others_told = gui.add_markdown("", visible=False)
+        self.others.on_update(self._others_wanted)
         self.save.on_click(self._save)
         self.clear.on_click(self._clear)
         self.reset.on_click(self._reset)
@@ -117,7 +102,7 @@ class Page:
         """A slider has moved."""
         if self._setting == threading.get_ident() or not self._waiting.acquire(blocking=False):
             return
-        with self._working:
+        with self._turns.mine():
             self._waiting.release()
             asked = self._asked()
             angles, depths, force = asked
@@ -131,53 +116,58 @@ class Page:
         return alpha, D, force
 
     def _reset(self, event: Any) -> None:
-        with self._working:
+        with self._turns.mine():
             self.show(self.live.reset())
 
     def _clear(self, event: Any) -> None:
-        with self._working:
+        with self._turns.mine():
             self.live.trace.clear()
-            self.show(self.live.shown)
+            self.scene.show_trace(self.live.trace)
 
     def _save(self, event: Any) -> None:
-        with self._working:
+        with self._turns.mine():
             text = self.live.command()
         (event.client or self.server).send_file_download(f"{self.live.robot.name}_command.yaml", text.encode())
 
     def show(self, shown: Shown, asked: tuple[Array, Array, Array] | None = None) -> None:
-        """Puts everything on the page, and the sliders to the command that is shown where it is not what they
-        ``asked`` for: others may have been moved on meanwhile."""
-        with self.server.atomic():
-            for mesh, tube in zip(self.tubes, shown.tubes, strict=True):
-                mesh.visible = len(tube.position) > 0
-                if mesh.visible:
-                    mesh.vertices = UNITS * tube_vertices(tube.position, tube.orientation, 0.5 * tube.diameter)
-            x, y, z, w = shown.tip.orientation.tolist()
-            self.tip.position, self.tip.wxyz = UNITS * shown.tip.position, (w, x, y, z)
-            tips = UNITS * np.array(self.live.trace).reshape(-1, 3)
-            self.trace.points = np.stack([tips[:-1], tips[1:]], axis=1)
-            start = shown.tip.position - ARROW * shown.tip_force / self._largest_force
-            self.arrow.points = UNITS * np.array([[start, shown.tip.position]])
-            self._show_numbers(shown)
+        """Puts everything on the page, snaps on the way first, and the sliders to the command that is shown where it is
+        not what they ``asked`` for: others may have been moved on meanwhile."""
+        self._forget_others()
         self._set_sliders(shown, self._asked() if asked is None else asked)
+        self._play(shown)
+        self._show(shown)
+        self._look_for_others()
 
-    def _show_numbers(self, shown: Shown) -> None:
-        warning = "**A snap is near.** " if shown.snap_is_near else ""
-        self.message.content = f"{warning}{shown.message}" if shown.good else f"**{shown.message}**"
-        for name, value, told, bar in (
-            ("stability margin", shown.margin, self.margin_told, self.margin),
-            ("snap reserve", shown.reserve, self.reserve_told, self.reserve),
-        ):
-            told.content = f"{name} {value:.3f}" + (" **near a snap**" if value < NEAR else "")
-            bar.value = 100.0 * min(max(0.0 if math.isnan(value) else value, 0.0), 1.0)
-            bar.color = RED if value < NEAR else GREEN
+    def _show(self, shown: Shown) -> None:
+        with self.server.atomic():
+            self.scene.show(solids(shown.tubes), shown.tip)
+            self.scene.show_force(shown.tip, shown.tip_force)
+            self.scene.show_trace(self.live.trace)
+            self._tell(shown)
+
+    def _play(self, shown: Shown) -> None:
+        """Shows the snaps on the way until somebody else wants the turn."""
+        for frame in shown.motion:
+            with self.server.atomic():
+                self._show_frame(frame)
+            if self._turns.pause(SNAP_TIME / FRAMES):
+                break
+        if shown.motion:
+            self.scene.tell("")
+
+    def _show_frame(self, frame: Frame) -> None:
+        self.scene.tell(f"SNAP, {MM * frame.released:.3g} mJ released")
+        self.scene.show(solids(frame.tubes), frame.tip, flash=1.0 - frame.share)
+
+    def _tell(self, shown: Shown) -> None:
+        warning = "**A snap is near.** " if shown.good and snap_is_near(shown.margin, shown.reserve) else ""
+        self.readout.tell(f"{warning}{shown.message}", shown.good)
+        self.readout.show_stability(shown.margin, shown.reserve)
         rows = [
-            f"| {tube.name} | {1e3 * torque:.2f} | {force:.3f} |"
+            (tube.name, f"{MM * torque:.2f}", f"{force:.3f}")
             for tube, torque, force in zip(shown.tubes, shown.torque, shown.force, strict=True)
         ]
-        tip = ", ".join(f"{place + 0.0:.2f}" for place in MM * shown.tip.position)
-        head = "| tube | torque [mN m] | force [N] |\n| --- | --- | --- |\n"
-        self.table.content = f"tip ({tip}) mm\n\n{head}" + "\n".join(rows)
+        self.readout.show_table(shown.tip.position, ("tube", "torque [mN m]", "force [N]"), rows)
 
     def _set_sliders(self, shown: Shown, asked: tuple[Array, Array, Array]) -> None:
         self._setting = threading.get_ident()
@@ -189,6 +179,47 @@ class Page:
                         slider.value = new
         finally:
             self._setting = None
+
+    def _others_wanted(self, event: Any) -> None:
+        """The checkbox has changed."""
+        with self._turns.mine():
+            self._forget_others()
+            self._look_for_others()
+
+    def _forget_others(self) -> None:
+        """Those of another command are not shown."""
+        self._question = None
+        self._searcher.ask(None)
+        self.scene.show_ghosts(())
+
+    def _look_for_others(self) -> None:
+        wanted = bool(self.others.value)
+        self.others_told.visible = wanted
+        if not wanted:
+            return
+        self.others_told.content = "looking for other equilibria ..."
+        shown = self.live.shown
+        self._question = Question(shown.alpha, shown.D, shown.tip_force)
+        self._searcher.ask(self._question)
+
+    def _found(self, question: Question, others: Others) -> None:
+        """What a search came to; comes in a thread of its own."""
+        with self._turns.mine():
+            if question is not self._question:
+                return  # the command has changed meanwhile
+            ghosts = others.beside(self.live.shown.tubes, self.live.tolerance)
+            with self.server.atomic():
+                self.scene.show_ghosts((solids(ghost.tubes), ghost.stable) for ghost in ghosts[:MOST_GHOSTS])
+                self.others_told.content = f"{_counted(ghosts)}; {others.told}"
+
+
+def _counted(ghosts: tuple[Ghost, ...]) -> str:
+    if not ghosts:
+        return "no other equilibrium"
+    stable = sum(ghost.stable for ghost in ghosts)
+    some = f", the first {MOST_GHOSTS} are shown" if len(ghosts) > MOST_GHOSTS else ""
+    count = "1 other" if len(ghosts) == 1 else f"{len(ghosts)} others"
+    return f"{count}, {stable} stable (green), {len(ghosts) - stable} unstable (purple){some}"
 
 
 def _slider(gui: Any, name: str, limits: Array, step: float) -> Any:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from ctr_pvs.cli.seeing.drawn import drawn_tubes
 from ctr_pvs.robot.loads import Loads
 from ctr_pvs.robot.robot import Limits
 from ctr_pvs.robot.robot import Robot
+from ctr_pvs.solve.snap import snap_motion
 from ctr_pvs.solve.solver import EquilibriumSolver
 
 Array = NDArray[np.float64]
@@ -28,8 +30,22 @@ POSES, BUDGET, TRACE = 60, 0.5, 2000
 TURN = 2.0 * math.pi
 #: Beyond every limit of D [m]: to ask the robot for its limits.
 FAR = 1e9
-#: Margin and reserve below which a snap is called near.
-NEAR = 0.2
+#: Shapes on the way of a snap, seconds that finding them again may take, and how many snaps of one move are shown: the
+#: last ones.
+FRAMES, FIND_AGAIN, MOST_SNAPS = 13, 0.2, 3
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One shape on the way of a snap.
+
+    share : of the way that is behind it, 0 to 1; released : energy [J] that the whole snap sets free.
+    """
+
+    tubes: tuple[DrawnTube, ...]
+    tip: Pose
+    share: float
+    released: float
 
 
 @dataclass(frozen=True)
@@ -39,6 +55,7 @@ class Shown:
     alpha (N,) [rad], D (N,) [m], tip_force (3,) [N]: the command that is shown.
     message : what came of the last command; good : whether it is the one that is shown.
     margin, reserve : see ``Equilibrium``; NaN where not known.  torque (N,) [N m], force (N,) [N].
+    motion : of the snaps on the way here.
     """
 
     alpha: Array
@@ -52,10 +69,7 @@ class Shown:
     reserve: float
     torque: Array
     force: Array
-
-    @property
-    def snap_is_near(self) -> bool:
-        return min(self.margin, self.reserve) < NEAR
+    motion: tuple[Frame, ...] = ()
 
 
 class LiveRobot:
@@ -65,7 +79,7 @@ class LiveRobot:
     """
 
     def __init__(self, robot: Robot, tolerance: float) -> None:
-        self.robot = robot
+        self.robot, self.tolerance = robot, tolerance
         self.trace: deque[Array] = deque(maxlen=TRACE)
         self._solver = EquilibriumSolver(robot, tolerance)
         self.shown = self.reset()
@@ -103,7 +117,7 @@ class LiveRobot:
         if not answer.success:
             last = self.shown
             message = f"{answer.status.value}: {answer.message}; shown is the last command that was answered"
-            self.shown = Shown(**{**vars(last), "message": message, "good": False})
+            self.shown = replace(last, message=message, good=False, motion=())
             return self.shown
         self.shown = self._show(answer, np.array((x, y, z)), "; ".join([_said(answer), *notes]))
         return self.shown
@@ -126,6 +140,14 @@ class LiveRobot:
             reserve,
             answer.torque,
             answer.force,
+            self._motion(answer),
+        )
+
+    def _motion(self, answer: Equilibrium) -> tuple[Frame, ...]:
+        return tuple(
+            Frame(drawn_tubes(self.robot, shape, POSES), shape.tip, index / (FRAMES - 1), snap.energy_released)
+            for snap in answer.snaps[-MOST_SNAPS:]
+            for index, shape in enumerate(snap_motion(answer, snap, FRAMES, FIND_AGAIN))
         )
 
     def command(self) -> str:

@@ -17,6 +17,8 @@ from ctr_pvs.robot.file import load_robot
 from ctr_pvs.robot.robot import Robot
 
 if TYPE_CHECKING:
+    from viser import ViserServer
+
     from ctr_pvs.cli.live.page import Page
 
 LARGEST_FORCE = (0.01, 1000.0)  # N
@@ -33,28 +35,36 @@ def declare_view(subcommands: argparse._SubParsersAction[Any]) -> None:
         "it, unless --host says otherwise.",
     )
     declare_robot(view)
-    view.add_argument("--port", type=whole_number(1, 65535), default=8080, metavar="P", help="(%(default)s)")
-    view.add_argument(
+    declare_page(view, "on a slider")
+    view.set_defaults(run=_view)
+
+
+def declare_page(parser: argparse.ArgumentParser, largest: str) -> None:
+    """Adds where a page is served, and the ``largest`` force on it."""
+    parser.add_argument("--port", type=whole_number(1, 65535), default=8080, metavar="P", help="(%(default)s)")
+    parser.add_argument(
         "--host", default="127.0.0.1", metavar="H", help="address to serve at (%(default)s: this machine only)"
     )
-    view.add_argument("--largest-force", type=number, default=1.0, metavar="F", help="on a slider [N] (%(default)g)")
-    view.set_defaults(run=_view)
+    parser.add_argument("--largest-force", type=_force, default=1.0, metavar="F", help=f"{largest} [N] (%(default)g)")
+
+
+def _force(text: str) -> float:
+    value, (low, high) = number(text), LARGEST_FORCE
+    if not low <= value <= high:
+        raise argparse.ArgumentTypeError(f"expected {low:g} to {high:g} N, got {value:g}")
+    return value
 
 
 def _view(arguments: argparse.Namespace) -> int:
     robot = load_robot(arguments.robot)
-    low, high = LARGEST_FORCE
-    if not low <= arguments.largest_force <= high:
-        raise UsageError(f"--largest-force: expected {low:g} to {high:g} N, got {arguments.largest_force:g}")
     page = served(robot, arguments.tolerance, arguments.host, arguments.port, arguments.largest_force)
-    host = f"[{arguments.host}]" if ":" in arguments.host else arguments.host
     try:
-        print(f"{robot.name}: http://{host}:{page.server.get_port()} (Ctrl-C ends)", flush=True)
+        print(f"{robot.name}: {address_of(page.server)} (Ctrl-C ends)", flush=True)
         threading.Event().wait()
     except KeyboardInterrupt:
         print()
     finally:
-        page.server.stop()
+        page.stop()
     return SUCCESS
 
 
@@ -63,17 +73,30 @@ def served(robot: Robot, tolerance: float, host: str, port: int, largest_force: 
 
     Raises ``UsageError`` without viser, and for an address that cannot be served at.
     """
+    server = new_server(host, port, f"ctr_pvs: {robot.name}")
+
+    from ctr_pvs.cli.live.page import Page
+    from ctr_pvs.cli.live.state import LiveRobot
+
+    return Page(server, LiveRobot(robot, tolerance), largest_force)
+
+
+def new_server(host: str, port: int, label: str) -> ViserServer:
+    """An empty page that asks the network for nothing; raises as ``served`` does."""
     try:
         import viser
     except ImportError as error:
         raise UsageError("view needs viser (pip install 'ctr_pvs[view]')") from error
     _check_free(host, port)
+    server = viser.ViserServer(host, port, label=label, verbose=False)
+    server.gui.configure_theme(show_logo=False, show_share_button=False)
+    return server
 
-    from ctr_pvs.cli.live.page import Page
-    from ctr_pvs.cli.live.state import LiveRobot
 
-    live = LiveRobot(robot, tolerance)
-    return Page(viser.ViserServer(host, port, label=f"ctr_pvs: {robot.name}", verbose=False), live, largest_force)
+def address_of(server: ViserServer) -> str:
+    """Its URL."""
+    host = server.get_host()
+    return f"http://{f'[{host}]' if ':' in host else host}:{server.get_port()}"
 
 
 def _check_free(host: str, port: int) -> None:

@@ -9,10 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ctr_pvs.cli.loads import loads_as_line
+from ctr_pvs.cli.seeing.moments import Moments
+from ctr_pvs.cli.seeing.moments import curvature_between
+from ctr_pvs.cli.seeing.moments import moments_between
+from ctr_pvs.cli.seeing.moments import places_along
 from ctr_pvs.robot.robot import Robot
 
 if TYPE_CHECKING:
-    from ctr_pvs.answer.backbone import Backbone
     from ctr_pvs.answer.equilibrium import Equilibrium
 
 Array = NDArray[np.float64]
@@ -42,7 +45,7 @@ class DrawnTube:
 class Drawn:
     """One equilibrium as pictures show it.
 
-    s (g,) [m]; twist (g, N) [rad], NaN past a tube's tip; curvature (g - 1,) [1/m] between neighbouring s.
+    s (g,) [m]; twist (g, N) [rad], NaN past a tube's tip; curvature (g - 1,) [1/m] and moments between neighbouring s.
     tip (3,) [m]; tip_force (3,) [N]; title, told : lines of text.
     """
 
@@ -52,13 +55,15 @@ class Drawn:
     s: Array
     twist: Array
     curvature: Array
+    moments: Moments
     tip: Array
     tip_force: Array
 
 
 def drawn(robot: Robot, equilibrium: Equilibrium) -> Drawn:
     """What is to be drawn of an answer that holds an equilibrium."""
-    backbone = equilibrium.backbone(PLACES)
+    backbone = equilibrium.backbone_at(places_along(equilibrium.shape.domain, PLACES))
+    curvature = curvature_between(backbone)
     loads = equilibrium.applied_loads
     return Drawn(
         f"{robot.name}: {equilibrium.status.value}: {equilibrium.message}",
@@ -66,7 +71,8 @@ def drawn(robot: Robot, equilibrium: Equilibrium) -> Drawn:
         drawn_tubes(robot, equilibrium, POSES),
         backbone.s,
         equilibrium.twist(backbone.s),
-        curvature_between(backbone),
+        np.abs(curvature),
+        moments_between(equilibrium, backbone.s, curvature),
         equilibrium.tip.position,
         np.array((0.0, 0.0, 0.0) if loads is None else loads.tip_force),
     )
@@ -88,18 +94,6 @@ def diameters(robot: Robot) -> list[float]:
     thin = THIN * max(tube.length for tube in robot.tubes)
     made_up = [thin * (1.0 + STEP * (robot.n_tubes - 1 - j)) for j in range(robot.n_tubes)]
     return [tube.outer_diameter or width for tube, width in zip(robot.tubes, made_up, strict=True)]
-
-
-def curvature_between(backbone: Backbone) -> Array:
-    """(n - 1,) curvature [1/m] between neighbouring poses: how far the tangent turns over the arc length.
-
-    Taken from the poses, not from the fields of a model, so that it holds at every model level and under loads."""
-    x, y, z, w = backbone.orientation.T
-    tangent = np.column_stack([w * w + x * x - y * y - z * z, 2.0 * (x * y + z * w), 2.0 * (x * z - y * w)])
-    half_chord = 0.5 * np.linalg.norm(np.diff(tangent, axis=0), axis=1)
-    length = np.diff(backbone.s)
-    turn = 2.0 * np.arcsin(np.clip(half_chord, 0.0, 1.0))
-    return np.divide(turn, length, out=np.zeros_like(turn), where=length > 0.0)
 
 
 def _told(robot: Robot, equilibrium: Equilibrium) -> tuple[str, ...]:

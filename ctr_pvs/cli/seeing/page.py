@@ -24,7 +24,7 @@ def save_page(drawn: Drawn, path: Path) -> None:
 
 
 def _data(drawn: Drawn) -> dict[str, object]:
-    """In mm, degrees and 1/m, with few digits: a picture."""
+    """In mm, degrees, 1/m and N mm, with few digits: a picture."""
     return {
         "tubes": [
             {
@@ -32,15 +32,26 @@ def _data(drawn: Drawn) -> dict[str, object]:
                 "colour": list(tube.colour),
                 "diameter": MM * tube.diameter,
                 "points": np.round(MM * tube.position, 3).tolist(),
-                "twist": [None if np.isnan(psi) else round(float(psi), 3) for psi in np.degrees(twist)],
+                "twist": _rounded(np.degrees(twist)),
+                "bending": _rounded(MM * bending),
+                "twisting": _rounded(MM * twisting),
             }
-            for tube, twist in zip(drawn.tubes, drawn.twist.T, strict=True)
+            for tube, twist, bending, twisting in zip(
+                drawn.tubes, drawn.twist.T, drawn.moments.bending.T, drawn.moments.twisting.T, strict=True
+            )
         ],
         "s": np.round(MM * drawn.s, 3).tolist(),
         "curvature": np.round(drawn.curvature, 4).tolist(),
+        "bending": _rounded(MM * drawn.moments.all_bending),
+        "twisting": _rounded(MM * drawn.moments.all_twisting),
         "tip": np.round(MM * drawn.tip, 3).tolist(),
         "force": drawn.tip_force.tolist(),
     }
+
+
+def _rounded(values: Array) -> list[float | None]:
+    """None where a tube is not."""
+    return [None if np.isnan(value) else round(float(value), 3) for value in values]
 
 
 _PAGE = """<!DOCTYPE html>
@@ -57,6 +68,8 @@ canvas { width: 100%; display: block; touch-action: none; }
 <canvas id="shape"></canvas>
 <div class="curves"><div>twist ψ [deg] along s [mm]<canvas id="twist"></canvas></div>
 <div>curvature [1/m] along s [mm]<canvas id="curvature"></canvas></div></div>
+<div class="curves"><div>bending moment [N mm] along s [mm], grey: of all tubes<canvas id="bending"></canvas></div>
+<div>twisting moment [N mm] along s [mm], grey: of all tubes<canvas id="twisting"></canvas></div></div>
 <small>Drag to turn, wheel to zoom, double click to reset. x is the insertion direction.</small>
 <script>
 "use strict";
@@ -78,7 +91,7 @@ function prepared(id) {
 }
 function drawShape() {
   const [pen, width, height] = prepared("shape");
-  const scale = 0.9 * view.zoom * Math.min(width, height * 1.6) / size;
+  const scale = 0.9 * view.zoom * Math.min(width, height) / size;
   const [cy, sy, cp, sp] = [Math.cos(view.yaw), Math.sin(view.yaw), Math.cos(view.pitch), Math.sin(view.pitch)];
   const seen = p => {  // right, up, towards the eye
     const [x, y, z] = p.map((v, i) => v - middle[i]);
@@ -152,9 +165,12 @@ function drawCurves(id, curves) {
 }
 function draw() {
   drawShape();
-  drawCurves("twist", data.tubes.map(tube => ({ s: data.s, y: tube.twist, colour: `rgb(${tube.colour.join()})` })));
   const between = data.curvature.map((_, i) => (data.s[i] + data.s[i + 1]) / 2);
-  drawCurves("curvature", [{ s: between, y: data.curvature, colour: "#444" }]);
+  const each = (s, name) => data.tubes.map(tube => ({ s, y: tube[name], colour: `rgb(${tube.colour.join()})` }));
+  const together = name => ({ s: between, y: data[name], colour: "#444" });
+  drawCurves("twist", each(data.s, "twist"));
+  drawCurves("curvature", [together("curvature")]);
+  for (const name of ["bending", "twisting"]) drawCurves(name, [...each(between, name), together(name)]);
 }
 document.getElementById("key").innerHTML = data.tubes.map(tube =>
   `<span><i style="background: rgb(${tube.colour.join()})"></i>${tube.name}, ${tube.diameter.toFixed(2)} mm</span>`

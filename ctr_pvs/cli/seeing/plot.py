@@ -19,10 +19,10 @@ def declare_plot(subcommands: argparse._SubParsersAction[Any]) -> None:
     plot = subcommands.add_parser(
         "plot",
         allow_abbrev=False,
-        help="one equilibrium as a picture: shape, twist, curvature",
+        help="one equilibrium as a picture: shape, twist, curvature, moments",
         description="Solves for one equilibrium, as solve does, and draws it: three projections with the tubes in "
-        "their diameters, twist and curvature along the robot, and what acts (PNG and SVG need matplotlib); or, as "
-        "HTML, a page that turns under the mouse and needs nothing but a browser.",
+        "their diameters, twist, curvature and moments along the robot, and what acts (PNG and SVG need "
+        "matplotlib); or, as HTML, a page that turns under the mouse and needs nothing but a browser.",
     )
     declare_robot(plot)
     declare_command(plot)

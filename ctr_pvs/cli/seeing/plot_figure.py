@@ -1,5 +1,5 @@
-"""The picture of one equilibrium, PNG or SVG: three projections of one scale, and twist and curvature along s.
-matplotlib is needed only when drawing."""
+"""The picture of one equilibrium, PNG or SVG: three projections of one scale, and along s twist, curvature and the
+moments in the tubes. matplotlib is needed only when drawing."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ LONGEST, SHORTEST, CURVES, LEFT, BELOW, ABOVE, RIGHT = 5.6, 1.3, 1.9, 0.85, 0.62
 #: Room around the shape, as a share of its largest extent; length of the arrow of the tip's force, likewise.
 ROOM, ARROW = 0.06, 0.18
 POINTS = 72.0  # per inch
-FORCE_COLOUR = "black"
+FORCE_COLOUR, TOGETHER = "black", "0.25"
 
 
 @dataclass(frozen=True)
@@ -48,9 +48,9 @@ def save_plot(drawn: Drawn, path: Path) -> None:
     scale = _scale(drawn)
     x, y, z = scale.size
     width = max(2.0 * LEFT + x + y + RIGHT, 9.0)
-    height = 3.0 * BELOW + y + z + CURVES + ABOVE
+    height = 4.0 * BELOW + y + z + 2.0 * CURVES + ABOVE
     figure = empty_figure((width, height))
-    bottoms = (2.0 * BELOW + CURVES, 3.0 * BELOW + CURVES + y)
+    bottoms = (3.0 * BELOW + 2.0 * CURVES, 4.0 * BELOW + 2.0 * CURVES + y)
     for (across, up), left, bottom in (
         ((0, 2), LEFT, bottoms[1]),
         ((0, 1), LEFT, bottoms[0]),
@@ -60,11 +60,14 @@ def save_plot(drawn: Drawn, path: Path) -> None:
         _draw_projection(figure.add_axes(place), drawn, scale, across, up)
     half = (width - 2.0 * LEFT - RIGHT) / 2.0
     panels = [
-        figure.add_axes((left / width, BELOW / height, half / width, CURVES / height))
+        figure.add_axes((left / width, bottom / height, half / width, CURVES / height))
+        for bottom in (2.0 * BELOW + CURVES, BELOW)
         for left in (LEFT, 2.0 * LEFT + half)
     ]
     _draw_twist(panels[0], drawn)
     _draw_curvature(panels[1], drawn)
+    _draw_moments(panels[2], drawn, drawn.moments.bending, drawn.moments.all_bending, "bending moment")
+    _draw_moments(panels[3], drawn, drawn.moments.twisting, drawn.moments.all_twisting, "twisting moment")
     _write(figure, drawn, (2.0 * LEFT + x) / width, (bottoms[0] + y) / height)
     figure.savefig(path)
 
@@ -108,16 +111,25 @@ def _draw_projection(axes: Axes, drawn: Drawn, scale: _Scale, across: int, up: i
 def _draw_twist(axes: Axes, drawn: Drawn) -> None:
     for tube, psi in zip(drawn.tubes, drawn.twist.T, strict=True):
         axes.plot(MM * drawn.s, np.degrees(psi), color=_share(tube.colour))
-    axes.set_xlabel("s [mm]")
-    axes.set_ylabel("twist ψ [deg]")
-    axes.grid(alpha=0.3)
+    _name_axes(axes, "twist ψ [deg]")
 
 
 def _draw_curvature(axes: Axes, drawn: Drawn) -> None:
-    axes.stairs(drawn.curvature, MM * drawn.s, baseline=None, color="0.25")
+    axes.stairs(drawn.curvature, MM * drawn.s, baseline=None, color=TOGETHER)
     axes.set_ylim(bottom=0.0)
+    _name_axes(axes, "curvature [1/m]")
+
+
+def _draw_moments(axes: Axes, drawn: Drawn, each: Array, together: Array, name: str) -> None:
+    for tube, moment in zip(drawn.tubes, each.T, strict=True):
+        axes.stairs(MM * moment, MM * drawn.s, baseline=None, color=_share(tube.colour))
+    axes.stairs(MM * together, MM * drawn.s, baseline=None, color=TOGETHER, linestyle="--")
+    _name_axes(axes, f"{name} [N mm]")
+
+
+def _name_axes(axes: Axes, name: str) -> None:
     axes.set_xlabel("s [mm]")
-    axes.set_ylabel("curvature [1/m]")
+    axes.set_ylabel(name)
     axes.grid(alpha=0.3)
 
 
@@ -132,6 +144,7 @@ def _write(figure: Figure, drawn: Drawn, left: float, top: float) -> None:
         Line2D([], [], color=_share(tube.colour), linewidth=4.0, label=_name(tube.name, tube.diameter))
         for tube in drawn.tubes
     ]
+    handles.append(Line2D([], [], color=TOGETHER, linestyle="--", label="all tubes, moments"))
     if drawn.tip_force.any():
         handles.append(Line2D([], [], color=FORCE_COLOUR, marker=r"$\rightarrow$", markersize=12, linestyle="none",
                               label="force on the tip"))  # fmt: skip
