@@ -49,8 +49,9 @@ def save_picture(found: Design, path: Path) -> None:
     for name, outcome, mark in (("before", found.before, "o"), ("after", found.after, "s")):
         distance = np.clip(1e3 * outcome.distances, LEAST, None)
         left.semilogy(numbers, np.where(np.isfinite(distance), distance, np.nan), mark, label=name, markersize=4.0)
+    left.axhline(1e3 * found.within, color="0.4", linestyle="--", linewidth=1.0, label="near enough")
     left.set(xlabel="target", ylabel="tip off by [mm]", title="what is left")
-    left.legend()
+    left.legend(loc="center right")
     left.grid(alpha=0.3)
     figure.tight_layout()
     figure.savefig(path)

@@ -26,7 +26,7 @@ SHOWN = {"m": (1e3, "mm"), "1/m": (1.0, "1/m")}
 
 def as_text(found: Design) -> str:
     """Targets, parameters, tubes before and after."""
-    kept = f"limits: strain {found.limits.strain:g}, margin {found.limits.margin:g}"
+    kept = f"limits: strain {found.limits.strain:g}, margin {found.limits.margin:g}; reached: within {found.within:g} m"
     stopped = "; stopped before the end" if found.stopped else ""
     lines = [
         f"{found.robot.name}: {_reached(found.after)}",
@@ -117,6 +117,7 @@ def as_json(found: Design) -> str:
         "tried": found.tried,
         "seconds": found.seconds,
         "limits": vars(found.limits),
+        "within": found.within,
         "parameters": [
             {"name": p.name, "unit": p.unit, "start": p.start, "value": value, "low": p.low, "high": p.high,
              "at_bound": bound}

@@ -99,15 +99,16 @@ class Outcome:
 class Design:
     """What a search for a robot found.
 
-    robot : the new one; start : the one to begin with.  parameters, values (P,) : what varied, and came of it; at_bound
-    (P,) : by a bound or a limit.  before, after : what both robots do.  tried : designs on the way to this one.
-    stopped : the search did not come to its end.
+    robot : the new one; start : the one to begin with.  within [m] : how near is there.  parameters, values (P,) : what
+    varied, and came of it; at_bound (P,) : by a bound or a limit.  before, after : what both robots do.
+    tried : designs on the way to this one.  stopped : the search did not come to its end.
     """
 
     robot: Robot
     start: Robot
     targets: Targets
     limits: DesignLimits
+    within: float
     parameters: tuple[Parameter, ...]
     values: Array
     at_bound: NDArray[np.bool_]
@@ -175,7 +176,7 @@ def design(
     new = room.robot_at(shares)
     at_bound = np.minimum(shares, 1.0 - shares) < AT_BOUND
     return Design(
-        new, robot, targets, limits, tuple(parameters), room.values(shares), at_bound, before,
+        new, robot, targets, limits, within, tuple(parameters), room.values(shares), at_bound, before,
         outcome(problem, new, best), 0 if best is None else best.tried, time.perf_counter() - began, ends(),
     )  # fmt: skip
 

@@ -28,9 +28,9 @@ from ctr_pvs.solve.solver import EquilibriumSolver
 from ctr_pvs.tasks.aim import Aim
 from ctr_pvs.tasks.calibration.rates import TubeRates
 from ctr_pvs.tasks.calibration.rates import tube_rates
-from ctr_pvs.tasks.descent import HASTY
 from ctr_pvs.tasks.descent import Descent
 from ctr_pvs.tasks.descent import End
+from ctr_pvs.tasks.descent import Patience
 from ctr_pvs.tasks.descent import descend
 from ctr_pvs.tasks.design.parameters import Parameter
 from ctr_pvs.tasks.design.parameters import stiffening
@@ -41,8 +41,10 @@ from ctr_pvs.tasks.walk import Refusal
 
 Array = NDArray[np.float64]
 
-#: Steps of a descent; for a target without a command, starts from the table of tips.
-STEPS, STARTS = 30, 3
+#: Of a descent: steps, and when it is over: rates are those of a least, and hold where it has nearly been found.
+STEPS, PATIENCE = 60, Patience(1e-4, 4)
+#: For a target that is missed, starts from the table of tips.
+STARTS = 3
 #: Of a target that no command was found for [m].
 LOST = 0.1
 #: Step of differences of the margin, in shares and radians.
@@ -118,7 +120,7 @@ class Made:
             return None
         if walker.answer.stability_margin < self.floor:
             return None
-        return descend(walker, self.aims[i], self._search.bounds, STEPS, HASTY)
+        return descend(walker, self.aims[i], self._search.bounds, STEPS, PATIENCE)
 
 
 def _left(descent: Descent | None) -> float:
@@ -132,7 +134,8 @@ def rates(problem: Problem, shares: Array, made: Made) -> Array:
     room, N = problem.room, made.robot.n_tubes
     design, values, travel = room.rates(shares), room.values(shares), made.commands.travel
     by_length, out = made.travel.rates(travel), np.zeros((len(made.found), len(shares)))
-    lengths = np.array([[p.kind == "length" and p.tube == j for p in room.parameters] for j in range(N)], dtype=float)
+    segments = [(j, i) for j, tube in enumerate(made.robot.tubes) for i in range(len(tube.segments))]
+    lengths = np.array([[float((p.tube, p.segment) == segment) for p in room.parameters] for segment in segments])
     margins = _Margins(problem, shares, made)
     for i, descent in enumerate(made.found):
         if descent is None or descent.end is End.MET:

@@ -60,7 +60,7 @@ def stage(problem: Problem, draft: Draft, wish: float = WISH) -> Draft:
 
 
 class _Squares:
-    """Residuals for scipy: distances over ``DISTANCE``, then ``wish`` times each curvature over the largest to begin with."""
+    """For scipy: distances over ``DISTANCE``, and ``wish`` times each curvature over the largest to begin with."""
 
     def __init__(self, problem: Problem, draft: Draft, wish: float) -> None:
         self.problem, self.wish, self.tried = problem, wish, draft.tried

@@ -11,21 +11,23 @@ from ctr_pvs.tasks.bounds import Bounds
 Array = NDArray[np.float64]
 
 
-class Travel:
-    """Of ``robot``: tube j goes from where the one around it is, or from its limit, to ``high``.
+#: Nearer than this to the orifice [m] a place of a tube is on it.
+AT_ORIFICE = 1e-7
 
-    high : (N,) largest D [m]; high_rates (N, N) : its rates with the tubes' lengths, 1 where the length of tube k is
-    what ends the travel of tube j.
-    """
+
+class Travel:
+    """Of ``robot``: tube j goes from where the one around it is, or from its limit, to ``high`` (N,) [m]."""
 
     def __init__(self, robot: Robot) -> None:
         bounds, N = Bounds(robot, None), robot.n_tubes
         self._low, self.high = bounds.low[N:], bounds.high[N:]
         lengths = np.array([tube.length for tube in robot.tubes])
-        self.high_rates = np.zeros((N, N))
+        self._ends = np.zeros((N, N), dtype=bool)  # whether the length of tube k is what ends the travel of tube j
         for j in range(N):
             if len(ends := np.flatnonzero(lengths[j:] <= self.high[j])):
-                self.high_rates[j, j + int(ends[0])] = 1.0
+                self._ends[j, j + int(ends[0])] = True
+        self._breaks = [tube.breaks[1:-1] for tube in robot.tubes]
+        self._first = np.concatenate([[0], np.cumsum([len(tube.segments) for tube in robot.tubes])]).tolist()
 
     def D(self, shares: Array) -> Array:
         """(M, N) [m] at ``shares`` (M, N)."""
@@ -46,13 +48,22 @@ class Travel:
         return np.clip(shares, 0.0, 1.0)
 
     def rates(self, shares: Array) -> Array:
-        """(M, N, N) rates of D with the tubes' lengths at held ``shares`` (M, N)."""
-        D, out = self.D(shares), np.zeros((*shares.shape, len(self.high)))
+        """(M, N, S) rates of D with the lengths of all S segments, outermost tube first, at held ``shares`` (M, N).
+
+        Where a segment of a tube begins at the orifice the tip's rates jump, and a least distance may rest there: such
+        a tube is taken to stay at that place.
+        """
+        D, out = self.D(shares), np.zeros((*shares.shape, self._first[-1]))
         for j in range(len(self.high)):
-            out[:, j] = shares[:, j, None] * self.high_rates[j]
+            for k in np.flatnonzero(self._ends[j]).tolist():
+                out[:, j, self._first[k] : self._first[k + 1]] = shares[:, j, None]
             if j:
                 pushed = (D[:, j - 1] > self._low[j])[:, None]  # its least is where the tube around it is
                 out[:, j] += np.where(pushed, (1.0 - shares[:, j, None]) * out[:, j - 1], 0.0)
+            for place, number in zip(self._breaks[j], range(1, len(self._breaks[j]) + 1), strict=True):
+                at = np.abs(D[:, j] - place) < AT_ORIFICE
+                out[at, j] = 0.0
+                out[at, j, self._first[j] : self._first[j] + number] = 1.0
         return out
 
     def _least(self, D: Array, j: int) -> Array:
