@@ -28,9 +28,9 @@ from ctr_pvs.solve.solver import EquilibriumSolver
 from ctr_pvs.tasks.aim import Aim
 from ctr_pvs.tasks.calibration.rates import TubeRates
 from ctr_pvs.tasks.calibration.rates import tube_rates
+from ctr_pvs.tasks.descent import HASTY
 from ctr_pvs.tasks.descent import Descent
 from ctr_pvs.tasks.descent import End
-from ctr_pvs.tasks.descent import Patience
 from ctr_pvs.tasks.descent import descend
 from ctr_pvs.tasks.design.parameters import Parameter
 from ctr_pvs.tasks.design.parameters import stiffening
@@ -41,8 +41,8 @@ from ctr_pvs.tasks.walk import Refusal
 
 Array = NDArray[np.float64]
 
-#: Of a descent: steps, and when it is over: rates are those of a least, and hold where it has nearly been found.
-STEPS, PATIENCE = 60, Patience(1e-4, 4)
+#: Steps of a descent, and how near a target it is gone on with to its end [m].
+STEPS, NEAR = 40, 5e-3
 #: For a target that is missed, starts from the table of tips.
 STARTS = 3
 #: Of a target that no command was found for [m].
@@ -111,6 +111,17 @@ class Made:
             if _left(descent) < _left(self.found[i]):
                 self.found[i] = descent
 
+    def settle(self) -> None:
+        """The nearest commands more exactly: rates are those of a least."""
+        for i, descent in enumerate(self.found):
+            if descent is not None:
+                self.found[i] = self._settled(i, descent)
+
+    def _settled(self, i: int, descent: Descent) -> Descent:
+        if descent.end not in (End.LEVEL, End.STEPS):
+            return descent
+        return descend(descent.walker, self.aims[i], self._search.bounds, STEPS)
+
     def _descent(self, i: int, start: tuple[Array, Array]) -> Descent | None:
         """None where the start has no equilibrium above the floor."""
         start = self.robot.clamp_command(*start)[:2]
@@ -120,7 +131,8 @@ class Made:
             return None
         if walker.answer.stability_margin < self.floor:
             return None
-        return descend(walker, self.aims[i], self._search.bounds, STEPS, PATIENCE)
+        hasty = descend(walker, self.aims[i], self._search.bounds, STEPS, HASTY)
+        return self._settled(i, hasty) if hasty.left < NEAR**2 else hasty
 
 
 def _left(descent: Descent | None) -> float:
@@ -130,7 +142,9 @@ def _left(descent: Descent | None) -> float:
 
 
 def rates(problem: Problem, shares: Array, made: Made) -> Array:
-    """(M, P) of ``made.off`` with the ``shares`` (P,) of the design; zeros for targets that are reached, or lost."""
+    """(M, P) of ``made.off``, settled, with the ``shares`` (P,) of the design; zeros for targets that are reached, or
+    lost."""
+    made.settle()
     room, N = problem.room, made.robot.n_tubes
     design, values, travel = room.rates(shares), room.values(shares), made.commands.travel
     by_length, out = made.travel.rates(travel), np.zeros((len(made.found), len(shares)))

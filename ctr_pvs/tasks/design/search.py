@@ -1,4 +1,5 @@
-"""From many designs to one: all of them get a stage, the better half of them another, and the last as many as help."""
+"""From many designs to one: all of them get a stage, the better half of them another, and the last as many as help.
+Once some reach all targets, only those go on."""
 
 from __future__ import annotations
 
@@ -48,7 +49,8 @@ def search(
         alone = len(drafts) == 1
         if stopped() or (alone and told[0].cost > (1.0 - SETTLED) * drafts[0].cost):
             break
-        drafts = sorted(told, key=lambda draft: draft.cost)[: (len(told) + 1) // 2]
+        there = [draft for draft in told if draft.worst == 0.0]
+        drafts = sorted(there or told, key=lambda draft: draft.cost)[: (len(told) + 1) // 2]
     return best
 
 

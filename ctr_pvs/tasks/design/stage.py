@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 
 #: What counts as one of a distance [m], and the weight of a curvature as a share of the largest to begin with.
 DISTANCE, WISH = 1e-3, 0.1
+#: Of a share that leaves where the stage began: what targets do not ask for stays.
+REST = 1e-2
 #: Designs that a stage tries, and shares of the sum of squares, of the design, that end one.
 TRIES, FINE = 15, 1e-6
 
@@ -60,10 +62,12 @@ def stage(problem: Problem, draft: Draft, wish: float = WISH) -> Draft:
 
 
 class _Squares:
-    """For scipy: distances over ``DISTANCE``, and ``wish`` times each curvature over the largest to begin with."""
+    """For scipy: distances over ``DISTANCE``, and ``wish`` times each curvature over the largest to begin with,
+    and ``REST`` times how far shares have gone."""
 
     def __init__(self, problem: Problem, draft: Draft, wish: float) -> None:
         self.problem, self.wish, self.tried = problem, wish, draft.tried
+        self.begin = draft.shares
         self.curved = [i for i, p in enumerate(problem.room.parameters) if p.kind == "curvature"]
         self.unit = max([problem.room.parameters[i].start for i in self.curved], default=1.0)
         self.best: Draft | None = None
@@ -90,11 +94,12 @@ class _Squares:
         cost = float(residuals @ residuals)
         if self.best is None or cost < self.best.cost:
             self.best = Draft(shares.copy(), made.commands, made.off, cost, self.tried)
-        return residuals
+        return np.concatenate([residuals, REST * (shares - self.begin)])
 
     def jacobian(self, shares: Array) -> Array:
         """Of a design that was taken."""
         made = self._made(shares)
         self._commands = made.commands
         wish = self.wish * self.problem.room.rates(shares)[self.curved] / self.unit
-        return np.vstack([rates(self.problem, shares, made) / DISTANCE, wish])
+        rest = REST * np.eye(len(shares))
+        return np.vstack([rates(self.problem, shares, made) / DISTANCE, wish, rest])
