@@ -124,7 +124,7 @@ def test_ctrl_c_keeps_the_best_so_far(words, tmp_path):
         if line.startswith("stage 1, design"):
             break
     run.send_signal(signal.SIGINT)
-    told, complaint = run.communicate(timeout=120)
+    told, complaint = run.communicate(timeout=300)
     assert run.returncode == 130, complaint
     assert "stopped before the end" in told and "ctr-pvs: stopped" in complaint
     assert load_robot(file).n_tubes == 2 and "stopped before the end" in file.read_text()

@@ -175,7 +175,7 @@ class Room:
             least = 0.5 * one.low * self._least_curvature(longer, one.tube) if one.outer else 0.0
             if least > self.limits.strain * (1.0 + ROUNDING):
                 rule = f"at least {least:.4g}, the least strain of tube {name!r} within the bounds"
-                raise FieldError("strain", self.limits.strain, rule, "vary its curvature or outer diameter more")
+                raise FieldError("strain", self.limits.strain, rule, "vary its curvature or diameter in wider bounds")
             below = max(one.low, below + one.gap)
             if below > top + ROUNDING:
                 which = "outer" if one.outer else "inner"

@@ -45,13 +45,18 @@ def search(
     drafts, best = first_designs(problem, starts, seed), None
     for number in range(1, MOST_STAGES + 1):
         told = _stages(problem, drafts, executor, report, stopped, f"stage {number}")
-        best = min([*([best] if best else []), *told], key=lambda draft: draft.cost, default=None)
+        best = min([*([best] if best else []), *told], key=_order, default=None)
         alone = len(drafts) == 1
         if stopped() or (alone and told[0].cost > (1.0 - SETTLED) * drafts[0].cost):
             break
         there = [draft for draft in told if draft.worst == 0.0]
-        drafts = sorted(there or told, key=lambda draft: draft.cost)[: (len(told) + 1) // 2]
+        drafts = sorted(there or told, key=_order)[: (len(told) + 1) // 2]
     return best
+
+
+def _order(draft: Draft) -> tuple[bool, float]:
+    """What reaches all comes before what does not."""
+    return draft.worst > 0.0, draft.cost
 
 
 def _stages(
