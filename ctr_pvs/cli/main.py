@@ -25,6 +25,7 @@ from ctr_pvs.cli.command import command_in
 from ctr_pvs.cli.command import declare_command
 from ctr_pvs.cli.command import declare_robot
 from ctr_pvs.cli.command import exit_code
+from ctr_pvs.cli.designs.design import declare_design
 from ctr_pvs.cli.live.view import declare_view
 from ctr_pvs.cli.remarks import robot_warnings_told
 from ctr_pvs.cli.remarks import tell
@@ -204,6 +205,7 @@ def _parser() -> Parser:
         declare_convert,
         declare_info,
         declare_calibrate,
+        declare_design,
         declare_reach,
         declare_follow,
         declare_plot,

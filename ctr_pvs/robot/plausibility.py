@@ -9,12 +9,11 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from ctr_pvs.robot.cross_section import annulus_modulus
+from ctr_pvs.robot.dimensions import largest_curvature
+from ctr_pvs.robot.dimensions import largest_strain
 from ctr_pvs.robot.robot import Range
 from ctr_pvs.robot.robot import Robot
-from ctr_pvs.robot.robot import Segment
 from ctr_pvs.robot.robot import Tube
 
 LARGEST_STRAIN = 0.10
@@ -25,7 +24,6 @@ MODULI = (1e7, 1.3e12)  # Pa, Young's modulus that stiffness and diameters make;
 LARGEST_STIFFNESS = 1e3  # N m^2, of bending; a steel rod of 15 mm has 500
 STIFFNESS_RATIOS = (0.02, 50.0)  # G J / K; 0.67 to 1 for plain tubes, patterned ones may be far from that
 LARGEST_ANGLE = 50.0  # rad, of a limit; 8 turns
-_SAMPLES = 101
 
 
 def implausible(robot: Robot) -> list[str]:
@@ -35,11 +33,6 @@ def implausible(robot: Robot) -> list[str]:
         remarks = [*_sizes(tube), *_stiffnesses(tube), *_strains(tube), *_limits(alpha, D)]
         found += [f"tube {tube.name!r}: {remark}" for remark in remarks]
     return found
-
-
-def largest_curvature(segment: Segment) -> float:
-    """The largest pre-curvature |kappa| [1/m] along a segment."""
-    return float(np.abs(segment.pre_curvature(np.linspace(0.0, segment.length, _SAMPLES))).max())
 
 
 def _sizes(tube: Tube) -> list[str]:
@@ -96,11 +89,11 @@ def _strains(tube: Tube) -> list[str]:
     largest = max(curvatures)
     where = f"segment {curvatures.index(largest) + 1}: its pre-curvature {largest:.4g} 1/m"
     guess = f"is that a radius in mm? Write radius_mm, or 1/radius: {1e3 / largest:.4g} 1/m" if largest else ""
-    if tube.outer_diameter is None:
+    strain = largest_strain(tube)
+    if tube.outer_diameter is None or strain is None:
         if largest * SMALLEST_RADIUS <= 1.0:
             return []
         return [f"{where} is a radius of {1e3 / largest:.3g} mm (under {1e3 * SMALLEST_RADIUS:g} mm); {guess}"]
-    strain = 0.5 * largest * tube.outer_diameter
     if strain <= LARGEST_STRAIN or tube.outer_diameter > OUTER_DIAMETERS[1]:  # of a wrong diameter is told already
         return []
     return [f"{where} strains a tube of {1e3 * tube.outer_diameter:g} mm by {100.0 * strain:.3g} % "

@@ -47,7 +47,10 @@ class Aim:
 
     def jacobian(self, answer: Equilibrium) -> Array:
         """(3 or 6, 2 N) rates of the residual with alpha [m/rad] and D."""
-        rates = answer.jacobian
+        return self.moved(answer, answer.jacobian)
+
+    def moved(self, answer: Equilibrium, rates: Array) -> Array:
+        """(3 or 6, n) rates of the residual where the tip, position and rotation, has ``rates`` (6, n)."""
         if self.orientation is not None:
             return np.concatenate([rates[:3], LEVER * rates[3:]])
         if self.tangent is not None:

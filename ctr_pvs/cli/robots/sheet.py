@@ -11,8 +11,10 @@ from ctr_pvs.oracles.tube_pair import materials_at
 from ctr_pvs.oracles.tube_pair import tube_pair
 from ctr_pvs.oracles.two_tubes import critical_lambda
 from ctr_pvs.oracles.two_tubes import two_tube_parameters
+from ctr_pvs.robot.dimensions import clearance
+from ctr_pvs.robot.dimensions import largest_strain
+from ctr_pvs.robot.dimensions import tube_curvature
 from ctr_pvs.robot.plausibility import implausible
-from ctr_pvs.robot.plausibility import largest_curvature
 from ctr_pvs.robot.robot import Robot
 from ctr_pvs.robot.robot import Segment
 from ctr_pvs.robot.robot import Tube
@@ -31,15 +33,14 @@ def sheet(robot: Robot) -> dict[str, Any]:
 
 
 def _tube(tube: Tube) -> dict[str, Any]:
-    curvature = max(map(largest_curvature, tube.segments))
     return {
         "name": tube.name,
         "length": tube.length,
         "inner_diameter": tube.inner_diameter,
         "outer_diameter": tube.outer_diameter,
         "density": tube.density,
-        "largest_curvature": curvature,
-        "largest_strain": None if tube.outer_diameter is None else 0.5 * curvature * tube.outer_diameter,
+        "largest_curvature": tube_curvature(tube),
+        "largest_strain": largest_strain(tube),
         "segments": [
             _segment(segment, begin, end)
             for segment, (begin, end) in zip(tube.segments, itertools.pairwise(tube.breaks.tolist()), strict=True)
@@ -62,9 +63,7 @@ def _segment(segment: Segment, begin: float, end: float) -> dict[str, Any]:
 
 
 def _clearance(outer: Tube, inner: Tube) -> dict[str, Any]:
-    bore, outside = outer.inner_diameter, inner.outer_diameter
-    gap = None if bore is None or outside is None else bore - outside
-    return {"outer": outer.name, "inner": inner.name, "diametral": gap}
+    return {"outer": outer.name, "inner": inner.name, "diametral": clearance(outer, inner)}
 
 
 def _pair(outer: Tube, inner: Tube) -> dict[str, Any]:

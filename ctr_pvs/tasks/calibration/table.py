@@ -20,6 +20,8 @@ POSITION, TANGENT, POSE, FORCE = ("x", "y", "z"), ("tx", "ty", "tz"), ("qx", "qy
 FEWEST = 4  # rows
 #: How far a direction's or a quaternion's length may be from 1.
 OFF_UNIT = 0.05
+#: What to do about a column that is not there.
+MAPPED = "or map another to it: --columns {}=NAME"
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +92,7 @@ def read_measurements(
     Raises ``TableError`` for what cannot be read, naming the column and the row.
     """
     file = os.fspath(path)
-    head, rows = _read(file)
+    head, rows = read_rows(file, FEWEST)
     names = dict(columns or {})
     joints = [[f"{kind}_{j + 1}" for j in range(tubes)] for kind in ("alpha", "D")]
     known = (*joints[0], *joints[1], *POSITION, *TANGENT, *POSE, *FORCE)
@@ -99,7 +101,9 @@ def read_measurements(
             raise TableError("columns", name, f"one of {', '.join(known)}")
 
     def take(wanted: Sequence[str]) -> Array:
-        return np.column_stack([_column(file, head, rows, name, names.get(name, name)) for name in wanted])
+        return np.column_stack(
+            [column(file, head, rows, names.get(name, name), MAPPED.format(name)) for name in wanted]
+        )
 
     def there(wanted: Sequence[str]) -> bool:
         return any(name in names or name in head for name in wanted)
@@ -108,9 +112,9 @@ def read_measurements(
     alpha = take(joints[0]) * (np.pi / 180.0 if degrees else 1.0)
     axes = None
     if there(POSE):
-        axes = _axes(_unit(file, "quaternion", take(POSE)))
+        axes = _axes(unit_rows(file, "quaternion", take(POSE)))
     elif there(TANGENT):
-        axes = _unit(file, "tangent", take(TANGENT))
+        axes = unit_rows(file, "tangent", take(TANGENT))
     return Measurements(
         unwrapped(alpha) if unwrap else alpha,
         take(joints[1]) * length * beta_sign,
@@ -120,14 +124,15 @@ def read_measurements(
     )
 
 
-def _read(file: str) -> tuple[list[str], list[list[str]]]:
+def read_rows(file: str, fewest: int) -> tuple[list[str], list[list[str]]]:
+    """Header and rows of a CSV file that has at least so many of these.  Raises ``TableError`` where not."""
     try:
         with open(file, newline="", encoding="utf-8-sig") as stream:
             rows = [row for row in csv.reader(stream) if any(cell.strip() for cell in row)]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise TableError(file, str(error), "a CSV file that can be read") from None
-    if len(rows) <= FEWEST:
-        raise TableError(file, f"{max(0, len(rows) - 1)} rows", f"a header and at least {FEWEST} rows")
+    if len(rows) <= fewest:
+        raise TableError(file, f"{max(0, len(rows) - 1)} rows", f"a header and rows, {fewest} at least")
     head = [cell.strip() for cell in rows[0]]
     for index, row in enumerate(rows[1:]):
         if len(row) < len(head):
@@ -135,10 +140,10 @@ def _read(file: str) -> tuple[list[str], list[list[str]]]:
     return head, rows[1:]
 
 
-def _column(file: str, head: list[str], rows: list[list[str]], name: str, title: str) -> Array:
+def column(file: str, head: list[str], rows: list[list[str]], title: str, remedy: str = "") -> Array:
+    """The finite numbers of one column.  Raises ``TableError``, with the ``remedy`` if the column is not there."""
     if title not in head:
-        raise TableError(f"{file}, column {title}", ", ".join(head), f"a column of this name for {name}",
-                         f"or map another to it: --columns {name}=NAME")  # fmt: skip
+        raise TableError(f"{file}, column {title}", ", ".join(head), "a column of this name", remedy)
     place, values = head.index(title), np.empty(len(rows))
     for index, row in enumerate(rows):
         try:
@@ -150,8 +155,8 @@ def _column(file: str, head: list[str], rows: list[list[str]], name: str, title:
     return values
 
 
-def _unit(file: str, what: str, vectors: Array) -> Array:
-    """The rows of ``vectors`` at length 1."""
+def unit_rows(file: str, what: str, vectors: Array) -> Array:
+    """The rows of ``vectors`` at length 1.  Raises ``TableError`` for one that is far from it."""
     sizes = np.linalg.norm(vectors, axis=1)
     if (wrong := np.flatnonzero(np.abs(sizes - 1.0) > OFF_UNIT)).size:
         row = int(wrong[0])

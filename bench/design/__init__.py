@@ -1,0 +1,1 @@
+"""Designs for targets of known robots."""

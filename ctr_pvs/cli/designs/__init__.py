@@ -1,0 +1,1 @@
+"""ctr-pvs design: robots for targets."""
