@@ -35,7 +35,7 @@ python_use_unqualified_type_names = True
 python_maximum_signature_line_length = 100
 # Types of others, which no page here describes, and our own that only fill signatures.
 nitpick_ignore_regex = [
-    ("py:.*", r"(numpy|collections\.abc|os)\..*"),
+    ("py:.*", r"(numpy|collections\.abc|concurrent\.futures|os)\..*"),
     ("py:class", "|".join(ALIASES)),
     ("py:class", r"ctr_pvs\.solve\.solver\.EquilibriumSolver"),  # what the solver of the page on it is derived from
 ]

@@ -102,6 +102,11 @@ class InverseSearch:
             raise NoEquilibriumError(f"no equilibrium to set out from: {answer.message}")
         return Walker(self.solver, answer, floor, deadline)
 
+    def starts(self, aim: Aim, count: int, deadline: float) -> list[tuple[Array, Array]]:
+        """See ``Table.starts``; the table is filled first, as far as it goes until the deadline."""
+        self._table.fill(deadline)
+        return self._table.starts(aim, count)
+
     def search(self, aim: Aim, walker: Walker, every: bool = False) -> InverseResult:
         """From where ``walker`` stands, then from other starts that it can come to; see
         ``tasks.solver.EquilibriumSolver.inverse``."""
@@ -110,8 +115,7 @@ class InverseSearch:
         found = [descend(first, aim, self.bounds, STEPS, HASTY)]
         cut_off: list[tuple[Array, Array]] = []
         if found[0].end is not End.TIMEOUT and (every or found[0].end is not End.MET):
-            self._table.fill(walker.deadline)
-            for start in self._table.starts(aim, STARTS_FOR_ALL if every else STARTS):
+            for start in self.starts(aim, STARTS_FOR_ALL if every else STARTS, walker.deadline):
                 descent = self._by_way_of(start, aim, walker)
                 if descent is None:
                     cut_off.append(start)

@@ -86,6 +86,18 @@ def test_the_reach_by_a_cluster(capsys, tmp_path, busy):
     assert run(capsys, "workspace", *words, "--scheduler", busy.address) == here
 
 
+def test_a_design_by_a_cluster(capsys, tmp_path, busy):
+    """The same robot, whoever tries the designs."""
+    targets = tmp_path / "targets.csv"
+    targets.write_text("x,y,z\n0.09,0.02,-0.03\n0.11,-0.03,-0.02\n", encoding="utf-8")
+    words = ["design", str(ROOT / "config" / "renda2021.yaml"), str(targets), "--starts", "2", "--vary", "curvature"]
+    here, there = tmp_path / "here.yaml", tmp_path / "there.yaml"
+    assert cli.main([*words, "--write", str(here)]) == 0
+    assert cli.main([*words, "--write", str(there), "--scheduler", busy.address]) == 0
+    assert "2 of 2 targets reached" in capsys.readouterr().out
+    assert here.read_text(encoding="utf-8") == there.read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize("first", ["threads", "cluster"])
 def test_one_goes_on_where_the_other_was_stopped(capsys, tmp_path, monkeypatch, busy, first):
     whole, path = tmp_path / "whole.csv", tmp_path / "parts.csv"

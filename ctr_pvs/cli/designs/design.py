@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 from typing import Any
@@ -14,6 +15,8 @@ from ctr_pvs.cli.seeing.words import declare_output
 from ctr_pvs.cli.words import UsageError
 from ctr_pvs.cli.words import number
 from ctr_pvs.cli.words import whole_number
+from ctr_pvs.cli.workers import declare_scheduler
+from ctr_pvs.cli.workers import executor
 from ctr_pvs.robot.file import load_robot
 
 if TYPE_CHECKING:
@@ -73,6 +76,7 @@ def declare_design(subcommands: argparse._SubParsersAction[Any]) -> None:
     design.add_argument(
         "--seed", type=whole_number(0, LARGEST_SEED), default=0, metavar="S", help="of the random numbers (%(default)s)"
     )
+    declare_scheduler(design)
     declare_output(design, "--write", (".yaml", ".yml"), help="write the new robot file")
     declare_output(design, "--output", (".png", ".svg"), help="draw robots at the targets, and what is left")
     design.add_argument("--json", action="store_true", help="print the answer as JSON, in SI units")
@@ -100,11 +104,13 @@ def _design(arguments: argparse.Namespace) -> int:
             raise UsageError(str(error)) from error
     limits = DesignLimits(arguments.strain, arguments.margin_floor, arguments.clearance, arguments.wall)
     targets = read_targets(arguments.targets, arguments.mm)
-    with Stop() as stop:
+    # Threads of its own are not waited for when it is stopped.
+    workers = executor(arguments.scheduler) if arguments.scheduler else nullcontext()
+    with Stop() as stop, workers as pool:
         found = design(
             robot, targets, arguments.vary or USUAL, limits, within=arguments.within,
             within_angle=arguments.within_angle, starts=arguments.starts, seed=arguments.seed,
-            progress=lambda line: print(line, file=sys.stderr, flush=True), stopped=lambda: stop.asked,
+            executor=pool, progress=lambda line: print(line, file=sys.stderr, flush=True), stopped=lambda: stop.asked,
         )  # fmt: skip
     print(as_json(found) if arguments.json else as_text(found))
     _save(found, arguments)

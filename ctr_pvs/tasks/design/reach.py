@@ -104,7 +104,7 @@ class Made:
 
     def look(self, i: int) -> None:
         """For a better command for one target, from a few of a table."""
-        for start in self._search.table.starts(self.aims[i], STARTS):
+        for start in self._search.starts(self.aims[i], STARTS, math.inf):
             if _left(self.found[i]) == 0.0:
                 break
             descent = self._descent(i, start)

@@ -57,7 +57,7 @@ class Targets:
         """Of each target; within [m], within_angle [rad] : how near is there."""
         tangents = [None] * len(self) if self.tangent is None else list(self.tangent)
         both = zip(self.position, tangents, strict=True)
-        return [Aim(position, tangent, None, within, within_angle, LEVER) for position, tangent in both]
+        return [Aim(position, tangent, None, within, within_angle) for position, tangent in both]
 
     def check_within(self, length: float) -> None:
         """Raises ``TableError`` for a target farther from the orifice [m] than any tube can be long."""
@@ -68,10 +68,6 @@ class Targets:
             raise TableError(
                 f"distance from the orifice, row {row + 1}", float(distance[row]), rule, "is that in mm? --mm"
             )
-
-
-#: Metres that a radian counts as, as in inverse kinematics.
-LEVER = 0.02
 
 
 def read_targets(path: str | os.PathLike[str], mm: bool = False) -> Targets:
