@@ -25,6 +25,7 @@ FULLEST = 12  # modules in a folder
 #: The only modules that draw.
 CHARTS = {
     "bench.growth.chart",
+    "bench.inverse.path_chart",
     "bench.loads.compliance_sweep",
     "bench.loads.cost_chart",
     "bench.loaded.failure_chart",
