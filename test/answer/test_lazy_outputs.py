@@ -121,3 +121,13 @@ def test_an_answer_that_went_to_another_process_tells_the_same(seed_robot):
     for solver in (here, there):
         solver.follow([0.1, 1.5], [0.09, 0.2])
     assert_equal(*(outputs(solver.solve([0.1, 1.6], [0.09, 0.2])) for solver in (here, there)))
+
+
+def test_a_pickled_solver_gives_the_same_bits(seed_robot):
+    solver, D = EquilibriumSolver(seed_robot, 1e-6), [0.0935, 0.1705]
+    solver.solve([0.0, 1.0], D)
+    other = pickle.loads(pickle.dumps(solver))
+    for start in ("warm", "cold"):
+        here, there = (each.solve([0.0, 1.1], D, start) for each in (solver, other))
+        assert here.state.unknowns.tobytes() == there.state.unknowns.tobytes()
+        assert here.state.tip.tobytes() == there.state.tip.tobytes()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
 import tracemalloc
 
 import numpy as np
@@ -272,16 +271,6 @@ def test_forces_noted_on_the_way_are_of_the_force_model(seed_robot):
     batch = solver.solve_batch([[0.0, 1.2]], [D], complete=True)
     assert batch.force[0].tobytes() == solver.solve([0.0, 1.2], D, "cold").force.tobytes()
     assert np.abs(batch.force[0] - solved(seed_robot, [[0.0, 1.2]], [D]).force[0]).max() > 1e-3
-
-
-def test_a_pickled_solver_gives_the_same_bits(seed_robot):
-    solver = EquilibriumSolver(seed_robot, 1e-6)
-    solver.solve([0.0, 1.0], PARTIAL)
-    other = pickle.loads(pickle.dumps(solver))
-    for start in ("warm", "cold"):
-        here, there = (each.solve([0.0, 1.1], PARTIAL, start) for each in (solver, other))
-        assert here.state.unknowns.tobytes() == there.state.unknowns.tobytes()
-        assert here.state.tip.tobytes() == there.state.tip.tobytes()
 
 
 def test_tubes_that_do_not_couple():

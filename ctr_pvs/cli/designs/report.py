@@ -8,12 +8,13 @@ import math
 from typing import TYPE_CHECKING
 from typing import Any
 
+from ctr_pvs.cli.robots.sheet import clearance_entry
+from ctr_pvs.cli.robots.sheet import tube_entry
 from ctr_pvs.renda2021.columns import aligned
 from ctr_pvs.robot.dimensions import clearance
 from ctr_pvs.robot.dimensions import largest_strain
 from ctr_pvs.robot.dimensions import tube_curvature
 from ctr_pvs.robot.robot import Robot
-from ctr_pvs.robot.robot import Tube
 
 if TYPE_CHECKING:
     from ctr_pvs.tasks.design.design import Design
@@ -130,7 +131,6 @@ def as_json(found: Design) -> str:
 
 
 def _outcome(found: Design, outcome: Outcome, robot: Robot) -> dict[str, Any]:
-    pairs = itertools.pairwise(robot.tubes)
     return {
         "reached": outcome.reached,
         "worst": _known(outcome.worst),
@@ -141,20 +141,9 @@ def _outcome(found: Design, outcome: Outcome, robot: Robot) -> dict[str, Any]:
              "reached": target.reached, "way": target.way, "message": target.message}
             for place, target in zip(found.targets.position.tolist(), outcome.targets, strict=True)
         ],
-        "tubes": [_tube(tube) for tube in robot.tubes],
-        "clearances": [{"outer": a.name, "inner": b.name, "diametral": clearance(a, b)} for a, b in pairs],
+        "tubes": [tube_entry(tube) for tube in robot.tubes],
+        "clearances": [clearance_entry(outer, inner) for outer, inner in itertools.pairwise(robot.tubes)],
     }  # fmt: skip
-
-
-def _tube(tube: Tube) -> dict[str, Any]:
-    return {
-        "name": tube.name,
-        "length": tube.length,
-        "inner_diameter": tube.inner_diameter,
-        "outer_diameter": tube.outer_diameter,
-        "largest_curvature": tube_curvature(tube),
-        "largest_strain": largest_strain(tube),
-    }
 
 
 def comments(found: Design, source: str, seed: int) -> list[str]:

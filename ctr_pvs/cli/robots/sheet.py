@@ -25,27 +25,36 @@ def sheet(robot: Robot) -> dict[str, Any]:
     return {
         "robot": robot.name,
         "tubes": [_tube(tube) for tube in robot.tubes],
-        "clearances": [_clearance(outer, inner) for outer, inner in itertools.pairwise(robot.tubes)],
+        "clearances": [clearance_entry(outer, inner) for outer, inner in itertools.pairwise(robot.tubes)],
         "pairs": [_pair(outer, inner) for outer, inner in itertools.combinations(robot.tubes, 2)],
         "limits": [_limits(robot, index) for index in range(robot.n_tubes)],
         "warnings": implausible(robot),
     }
 
 
-def _tube(tube: Tube) -> dict[str, Any]:
+def tube_entry(tube: Tube) -> dict[str, Any]:
+    """Dimensions of one tube, and what straightening strains it by."""
     return {
         "name": tube.name,
         "length": tube.length,
         "inner_diameter": tube.inner_diameter,
         "outer_diameter": tube.outer_diameter,
-        "density": tube.density,
         "largest_curvature": tube_curvature(tube),
         "largest_strain": largest_strain(tube),
-        "segments": [
-            _segment(segment, begin, end)
-            for segment, (begin, end) in zip(tube.segments, itertools.pairwise(tube.breaks.tolist()), strict=True)
-        ],
     }
+
+
+def clearance_entry(outer: Tube, inner: Tube) -> dict[str, Any]:
+    """Of two neighbours."""
+    return {"outer": outer.name, "inner": inner.name, "diametral": clearance(outer, inner)}
+
+
+def _tube(tube: Tube) -> dict[str, Any]:
+    segments = [
+        _segment(segment, begin, end)
+        for segment, (begin, end) in zip(tube.segments, itertools.pairwise(tube.breaks.tolist()), strict=True)
+    ]
+    return {**tube_entry(tube), "density": tube.density, "segments": segments}
 
 
 def _segment(segment: Segment, begin: float, end: float) -> dict[str, Any]:
@@ -60,10 +69,6 @@ def _segment(segment: Segment, begin: float, end: float) -> dict[str, Any]:
         "turn": segment.turn,
         "straight": segment.is_straight,
     }
-
-
-def _clearance(outer: Tube, inner: Tube) -> dict[str, Any]:
-    return {"outer": outer.name, "inner": inner.name, "diametral": clearance(outer, inner)}
 
 
 def _pair(outer: Tube, inner: Tube) -> dict[str, Any]:
