@@ -7,10 +7,7 @@ from numpy.typing import NDArray
 
 from ctr_pvs.answer.engine import Engine
 from ctr_pvs.answer.state import State
-from ctr_pvs.kernel.arrays import S_ESTIMATE
-from ctr_pvs.kernel.arrays import S_LOADS
 from ctr_pvs.kernel.arrays import S_STEPS
-from ctr_pvs.kernel.arrays import S_SWUNG
 from ctr_pvs.kernel.walk.alone import RAISES
 from ctr_pvs.kernel.walk.step import NOT_PROVEN
 from ctr_pvs.kernel.walk.step import OK
@@ -21,25 +18,20 @@ Array = NDArray[np.float64]
 TIGHT = 1e-9
 
 
-def missed(engine: Engine, vector: Array) -> bool:
-    """True if a state does not meet the tolerance: by its estimate, and without loads also by a bound that keeps
-    torques and forces in step with it."""
-    return bool(
-        vector[S_ESTIMATE] > engine.tolerance or (vector[S_LOADS] == 0.0 and vector[S_SWUNG] > engine.tolerance)
-    )
-
-
-def raised(engine: Engine, vector: Array, alpha: Array, D: Array, loads: Array) -> tuple[int, Array]:
-    """The state ``vector`` of the first choice of degrees, solved again with higher ones until it meets the
-    tolerance."""
-    code, steps = OK, vector[S_STEPS]
+def raised(engine: Engine, state: State, alpha: Array, D: Array, loads: Array) -> State | None:
+    """``state``, of the first choice of degrees, solved again with higher ones until it meets the tolerance; none where
+    a step is not proven."""
+    steps = state.steps
     for more in RAISES[1:]:
-        if code != OK or not missed(engine, vector):
+        if not state.misses(engine.tolerance):
             break
-        code, vector = engine.step(vector, alpha, D, loads, more)
-        steps += vector[S_STEPS]
+        code, vector = engine.step(state.vector, alpha, D, loads, more)
+        if code != OK:
+            return None
+        steps += int(vector[S_STEPS])
         vector[S_STEPS] = steps
-    return code, vector
+        state = State(vector, len(alpha))
+    return state
 
 
 def settled(engine: Engine, vector: Array, loads: Array, untwisted: bool) -> tuple[int, Array]:
@@ -55,7 +47,7 @@ def settled(engine: Engine, vector: Array, loads: Array, untwisted: bool) -> tup
         if code == OK:
             steps += out[S_STEPS]
             found = out
-            if not missed(engine, out):
+            if not State(out, len(alpha)).misses(engine.tolerance):
                 break
     if not len(found):
         return NOT_PROVEN, vector

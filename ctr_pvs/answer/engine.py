@@ -16,7 +16,6 @@ from ctr_pvs.kernel import entries
 from ctr_pvs.kernel import outputs
 from ctr_pvs.kernel.arrays import CAPACITIES
 from ctr_pvs.kernel.arrays import ELEMENTS
-from ctr_pvs.kernel.arrays import FACTORS
 from ctr_pvs.kernel.arrays import LOADS
 from ctr_pvs.kernel.arrays import NODES
 from ctr_pvs.kernel.arrays import SECTIONS
@@ -50,7 +49,6 @@ class Workspace:
         self.capacity = np.zeros(CAPACITIES, dtype=np.int64)
         self.capacity[SECTIONS], self.capacity[ELEMENTS] = sections, sections
         self.capacity[NODES], self.capacity[UNKNOWNS] = 12 * sections, 20 * tubes * sections
-        self.capacity[FACTORS] = sections * (9 * tubes) ** 2
         self.capacity[WIDEST] = 12 * tubes
         self._allocate()
 

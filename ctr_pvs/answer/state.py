@@ -12,6 +12,7 @@ from ctr_pvs.kernel.arrays import S_LOADS
 from ctr_pvs.kernel.arrays import S_RESIDUAL
 from ctr_pvs.kernel.arrays import S_SOLVED
 from ctr_pvs.kernel.arrays import S_STEPS
+from ctr_pvs.kernel.arrays import S_SWUNG
 from ctr_pvs.kernel.arrays import S_TIP
 from ctr_pvs.kernel.arrays import S_TWISTS
 from ctr_pvs.kernel.arrays import S_UNKNOWNS
@@ -24,13 +25,15 @@ Array = NDArray[np.float64]
 class State:
     """An equilibrium as the kernel knows it.
 
-    vector : see ``kernel.arrays``; alpha (N,) [rad], D (N,) [m], torque (N,) dE/dalpha [N m].
+    vector : see ``kernel.arrays``, its first numbers not to be changed any more; alpha (N,) [rad], D (N,) [m], torque
+    (N,) dE/dalpha [N m].
     """
 
-    __slots__ = ("_tubes", "vector")
+    __slots__ = ("_numbers", "_tubes", "vector")
 
     def __init__(self, vector: Array, tubes: int) -> None:
         self.vector, self._tubes = vector, tubes
+        self._numbers: list[float] = vector[:STATE].tolist()  # one by one an array's take five times as long
 
     @property
     def alpha(self) -> Array:
@@ -48,7 +51,7 @@ class State:
     def loads(self) -> Array:
         """Packed loads, see ``model.packing``."""
         first = STATE + 3 * self._tubes
-        return self.vector[first : first + int(self.vector[S_LOADS])].copy()
+        return self.vector[first : first + int(self._numbers[S_LOADS])].copy()
 
     @property
     def coupled(self) -> bool:
@@ -64,8 +67,8 @@ class State:
     @property
     def unknowns(self) -> Array:
         """(U,) [sqrt(J)] of the guide, then element by element and tube by tube."""
-        first = STATE + 3 * self._tubes + int(self.vector[S_LOADS])
-        return self.vector[first : first + int(self.vector[S_UNKNOWNS])]
+        first = STATE + 3 * self._tubes + int(self._numbers[S_LOADS])
+        return self.vector[first : first + int(self._numbers[S_UNKNOWNS])]
 
     @property
     def tip(self) -> Array:
@@ -75,27 +78,33 @@ class State:
     @property
     def residual(self) -> float:
         """Bound of the twist [rad] that the unbalanced torque would cause."""
-        return float(self.vector[S_RESIDUAL])
+        return self._numbers[S_RESIDUAL]
 
     @property
     def estimate(self) -> float:
         """Of the tip error [m]."""
-        return float(self.vector[S_ESTIMATE])
+        return self._numbers[S_ESTIMATE]
+
+    def misses(self, tolerance: float) -> bool:
+        """True if it is not within ``tolerance`` [m]: by its estimate, and without loads also by a bound that keeps
+        torques and forces in step with it."""
+        numbers = self._numbers
+        return numbers[S_ESTIMATE] > tolerance or (numbers[S_LOADS] == 0.0 and numbers[S_SWUNG] > tolerance)
 
     @property
     def steps(self) -> int:
         """Newton steps spent."""
-        return int(self.vector[S_STEPS])
+        return int(self._numbers[S_STEPS])
 
     @property
     def solved_for(self) -> int:
         """Number of unknowns, those that only check left out."""
-        return int(self.vector[S_SOLVED])
+        return int(self._numbers[S_SOLVED])
 
     @property
     def twists(self) -> bool:
         """False where twist is neglected."""
-        return bool(self.vector[S_TWISTS] == TWISTED)
+        return self._numbers[S_TWISTS] == TWISTED
 
 
 @dataclass(frozen=True, eq=False)

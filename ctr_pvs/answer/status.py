@@ -18,7 +18,7 @@ class Status(Enum):
     @property
     def success(self) -> bool:
         """True if the answer is a stable equilibrium within tolerance."""
-        return self in (Status.OK, Status.SNAP)
+        return self is Status.OK or self is Status.SNAP
 
 
 class NoEquilibriumError(RuntimeError):

@@ -199,14 +199,16 @@ def slide_work(scene: Scene, tubes: Array, m: int, j: int) -> float:
     loaded, first = scene.marks[m, LOADED] == 1, 3 * (j * tubes.shape[1] + i)
     K = tubes[j, i, BENDING]
     for row in range(scene.marks[m, ROW], scene.marks[m, ROW] + scene.marks[m, GAUSS]):
-        w, k = scene.gauss[row, WEIGHT], scene.bends[row, MOMENT]
-        for other in range(scene.base.shape[1]):
-            k += scene.moments[TURNED, row, other]
-        psi = scene.turns[PSI, row, j]
-        e = complex(math.cos(psi), math.sin(psi))
-        strain = scene.moments[REST, row, j] / K - k / scene.line[m, STIFFNESS] * e.conjugate()
+        w = scene.gauss[row, WEIGHT]
         rate = pre_curvature_rate(tubes, j, i, scene.gauss[row, PLACE] + scene.base[AT, j])
-        total += w * K * (strain.conjugate() * rate).real
+        if rate != 0.0:
+            k = scene.bends[row, MOMENT]
+            for other in range(scene.base.shape[1]):
+                k += scene.moments[TURNED, row, other]
+            psi = scene.turns[PSI, row, j]
+            e = complex(math.cos(psi), math.sin(psi))
+            strain = scene.moments[REST, row, j] / K - k / scene.line[m, STIFFNESS] * e.conjugate()
+            total += w * K * (strain.conjugate() * rate).real
         if loaded:
             total += w * dot(scene.loads[first : first + 3], scene.axes[row])
     return total

@@ -40,9 +40,11 @@ Complex = NDArray[np.complex128]
 
 #: Capacities that ``ints`` begins with, and how many of its entries those take.  WIDEST: rows of the largest matrix of
 #: one element; LOADS: floats of packed loads.
-SECTIONS, ELEMENTS, NODES, UNKNOWNS, FACTORS, WIDEST, LOADS = range(7)
-CAPACITIES = 7
+SECTIONS, ELEMENTS, NODES, UNKNOWNS, WIDEST, LOADS = range(6)
+CAPACITIES = 6
 
+#: Rows of the springs of one element, summed.
+SUMS = HIGHEST_DEGREE + 2
 #: Vectors of unknowns that a workspace has room for beside a scene's own.
 ROWS = 42
 
@@ -55,7 +57,6 @@ ABSENT = -1
     N_ELEMENTS,
     N_NODES,
     N_UNKNOWNS,
-    N_FACTORS,
     LAST_ACTIVE,
     RAISED,
     FLOOR,
@@ -65,8 +66,8 @@ ABSENT = -1
     N_LOADS,
     N_POINTS,
     MOMENTS,
-) = range(13)
-COUNTS = 13
+) = range(12)
+COUNTS = 12
 
 #: Columns of a packed point load, see ``model.packing``.
 TUBE, AT_X, POINT_FORCE, POINT_MOMENT = 0, 1, 2, 5
@@ -82,8 +83,8 @@ STATICS = 9
 TANGENT, NORMAL, BINORMAL, AXIAL, TURNING = 0, 3, 6, 9, 10
 AXES = 13
 SCALE, ANGLE, TORQUE = range(3)
-COUPLED, DEGREE, GAUSS, ROW, BLOCK, LOADED, MU, MU_SIZE = range(8)
-MARKS = 8
+COUPLED, DEGREE, GAUSS, ROW, LOADED, MU, MU_SIZE = range(7)
+MARKS = 7
 SEGMENT, FIRST, SIZE = range(3)
 REST, TURNED = range(2)
 PSI, BEFORE, RATE, PULL = range(4)
@@ -91,20 +92,10 @@ Y, GRADIENT, STEP, OTHER, FRAMED = range(5)
 BEND, TRIAL, SPINOR, MU_HERE, MOMENT = 0, 1, 2, 4, 5
 BENDS = 6
 #: Of a ``Bench``: rows of ``squares``, ``lines`` and ``moved``.
-BEYOND, BASE, SPRINGS = range(3)
+BEYOND, BASE = range(2)
 FORCE, BENT, TURNED_BY, NONE, ALPHA_RATE, D_RATE, TORQUES, WRENCH = range(8)
 LINES = 8
 EXPLICIT, ANSWERED = range(2)
-
-
-class Kit(NamedTuple):
-    """What every entry point is given: the robot, the quadrature rules and the workspace of one thread, see above."""
-
-    tubes: Array
-    segments: Ints
-    rules: Array
-    floats: Array
-    ints: Ints
 
 
 class Scene(NamedTuple):
@@ -125,9 +116,9 @@ class Scene(NamedTuple):
         PER_LENGTH, load on it [N/m]; row M: force and moment of all beyond the orifice.
     held (3, M + 1, N) : SCALE of an element [rad/sqrt(J)]; ANGLE, psi at its start [rad]; TORQUE that bending beyond
         pulls there [N m].
-    marks (M, 8) : COUPLED, 1 where fields vary inside: two curved tubes or more overlap, or it is LOADED, a load acts
-        beyond; DEGREE of the polynomials; GAUSS, number of points, and ROW of the first; BLOCK, where its factors
-        begin; MU, first unknown of mu_y, MU_SIZE, how many, those of mu_z after them.
+    marks (M, 7) : COUPLED, 1 where fields vary inside: two curved tubes or more overlap, or it is LOADED, a load acts
+        beyond; DEGREE of the polynomials; GAUSS, number of points, and ROW of the first; MU, first unknown of mu_y,
+        MU_SIZE, how many, those of mu_z after them.
     parts (3, M, N) : SEGMENT or ABSENT; FIRST unknown of a tube; SIZE, how many it has at the finer degree.
     gauss (G, 2) : PLACE, arc length [m]; WEIGHT [m].  axes (G, 13) : TANGENT, NORMAL, BINORMAL of the Bishop frame in
         base axes; AXIAL, the moment of the loads beyond along the tangent [N m]; TURNING, room for a turn of the frame
@@ -188,11 +179,13 @@ class Sections(NamedTuple):
 class Bench(NamedTuple):
     """Where the kernel works.
 
-    factors : of every element, its factorised matrix, and how its end moves with its unknowns.
-    squares (3, N + 3, N + 3) : stiffness of what lies BEYOND, at the BASE, and of SPRINGS at a place.
+    factors (M, W, W), sides (M, W), swings (M, 3, W) : of every element, in the first of its W rows, its factorised
+        matrix, a right-hand side, and under load how the frame at its end turns with its unknowns and its start.
+    squares (2, N + 3, N + 3) : stiffness of what lies BEYOND and at the BASE.
     lines (8, N + 6) : FORCE and turns (BENT) on the way through the elements; TURNED_BY, what the bases turn by; NONE,
         zeros; ALPHA_RATE and D_RATE, a direction; TORQUES at the bases [N m]; WRENCH, its first six, on the tip.
-    row (W,) : of one element's unknowns; offset (N,) : first unknown of each tube inside an element.
+    sums (SUMS, SUMS) : springs of one element.  row (W,) : of one element's unknowns; offset (N,) : first unknown of
+        each tube inside an element.
     spread (3 (MOST_NODES + 4) W,) : how an element's frame turns with its unknowns, see ``loaded.hessian``.
     space (6, 3), sites (2, MOST_NODES, 3) : vectors of space; series (HIGHEST_DEGREE + 2, 7) : Legendre coefficients.
     rows (ROWS, U) : vectors of unknowns.
@@ -201,7 +194,10 @@ class Bench(NamedTuple):
     """
 
     factors: Array
+    sides: Array
+    swings: Array
     squares: Array
+    sums: Array
     lines: Array
     row: Array
     spread: Array
@@ -215,14 +211,26 @@ class Bench(NamedTuple):
     offset: Ints
 
 
+class Kit(NamedTuple):
+    """What every entry point is given: the robot, the quadrature rules and the workspace of one thread, see above; and
+    what is in that: two scenes and the bench."""
+
+    tubes: Array
+    segments: Ints
+    rules: Array
+    floats: Array
+    ints: Ints
+    scenes: tuple[Scene, Scene]
+    bench: Bench
+
+
 @entry_point("UniTuple(int64, 2)(int64, int64[::1])")
 def workspace_sizes(tubes: int, capacity: Ints) -> tuple[int, int]:
     """How many floats and ints a workspace of this ``capacity`` (CAPACITIES,) takes."""
     sections, elements, unknowns = capacity[SECTIONS], capacity[ELEMENTS], capacity[UNKNOWNS]
     floats = 3 * sections + 1 + 2 * scene_floats(tubes, capacity)
-    floats += (
-        capacity[FACTORS] + (3 * (tubes + 3) + LINES) * (tubes + 6) + (3 * (MOST_NODES + 4) + 1) * capacity[WIDEST]
-    )
+    floats += capacity[WIDEST] * (elements * (capacity[WIDEST] + 4) + 3 * (MOST_NODES + 4) + 1)
+    floats += (2 * (tubes + 3) + LINES) * (tubes + 6) + SUMS * SUMS
     floats += 18 + 6 * MOST_NODES + 7 * (HIGHEST_DEGREE + 2) + ROWS * unknowns + (elements + 1) * (3 * tubes + 10)
     ints = CAPACITIES + sections * (tubes + 5) + 2 * scene_ints(tubes, capacity) + tubes
     return floats, ints
@@ -243,9 +251,17 @@ def scene_ints(tubes: int, capacity: Ints) -> int:
 
 
 @compiled
-def scene_of(kit: Kit, which: int) -> Scene:
+def kit_of(tubes: Array, segments: Ints, rules: Array, floats: Array, ints: Ints) -> Kit:
+    """What an entry point was given, with the arrays of the workspace under their names: to be called once, as making
+    views takes a while (1 us of a step of 15)."""
+    N = len(segments)
+    scenes = scene_of(floats, ints, N, 0), scene_of(floats, ints, N, 1)
+    return Kit(tubes, segments, rules, floats, ints, scenes, bench_of(floats, ints, N))
+
+
+@compiled
+def scene_of(floats: Array, ints: Ints, tubes: int, which: int) -> Scene:
     """Scene number ``which`` (0 or 1) of a workspace."""
-    floats, ints, tubes = kit.floats, kit.ints, len(kit.segments)
     elements, nodes, unknowns = ints[ELEMENTS], ints[NODES], ints[UNKNOWNS]
     f = 3 * ints[SECTIONS] + 1 + which * scene_floats(tubes, ints)
     i = CAPACITIES + ints[SECTIONS] * (tubes + 5) + which * scene_ints(tubes, ints)
@@ -300,17 +316,22 @@ def sections_of(kit: Kit) -> Sections:
 
 
 @compiled
-def bench_of(kit: Kit) -> Bench:
+def bench_of(floats: Array, ints: Ints, tubes: int) -> Bench:
     """Where the kernel works in a workspace."""
-    floats, ints, tubes = kit.floats, kit.ints, len(kit.segments)
     elements, unknowns, widest = ints[ELEMENTS], ints[UNKNOWNS], ints[WIDEST]
     f = 3 * ints[SECTIONS] + 1 + 2 * scene_floats(tubes, ints)
     i = CAPACITIES + ints[SECTIONS] * (tubes + 5) + 2 * scene_ints(tubes, ints)
     e1, ends = elements + 1, tubes + 3
-    factors = floats[f : f + ints[FACTORS]]
-    f += ints[FACTORS]
-    squares = floats[f : f + 3 * ends * ends].reshape(3, ends, ends)
-    f += 3 * ends * ends
+    factors = floats[f : f + elements * widest * widest].reshape(elements, widest, widest)
+    f += elements * widest * widest
+    sides = floats[f : f + elements * widest].reshape(elements, widest)
+    f += elements * widest
+    swings = floats[f : f + 3 * elements * widest].reshape(elements, 3, widest)
+    f += 3 * elements * widest
+    squares = floats[f : f + 2 * ends * ends].reshape(2, ends, ends)
+    f += 2 * ends * ends
+    sums = floats[f : f + SUMS * SUMS].reshape(SUMS, SUMS)
+    f += SUMS * SUMS
     lines = floats[f : f + LINES * (tubes + 6)].reshape(LINES, tubes + 6)
     f += LINES * (tubes + 6)
     row = floats[f : f + widest]
@@ -331,4 +352,7 @@ def bench_of(kit: Kit) -> Bench:
     f += 2 * e1 * ends
     rates = floats[f : f + e1 * ends].reshape(e1, ends)
     offset = ints[i : i + tubes]
-    return Bench(factors, squares, lines, row, spread, space, sites, series, rows, ends_move, moved, rates, offset)
+    return Bench(
+        factors, sides, swings, squares, sums, lines, row, spread, space, sites, series, rows, ends_move, moved, rates,
+        offset,
+    )  # fmt: skip

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from ctr_pvs.kernel.arrays import ANGLE
 from ctr_pvs.kernel.arrays import ARC
 from ctr_pvs.kernel.arrays import BEFORE
@@ -99,7 +101,7 @@ def mu_between(scene: Scene, s: float) -> complex:
     value, before, here = 0j, 0.0, 1.0
     for k in range(size):
         y = complex(scene.vectors[Y, first + k], scene.vectors[Y, first + size + k])
-        value += y * here * (2.0 * k + 1.0) ** 0.5
+        value += y * here * math.sqrt(2.0 * k + 1.0)
         before, here = here, ((2.0 * k + 1.0) * x * here - k * before) / (k + 1.0)
     return mu_scale(scene, m) * value
 
@@ -148,7 +150,7 @@ def torque_at(scene: Scene, s: float, j: int) -> float:
     x = 2.0 * (s - scene.line[m, ARC]) / scene.line[m, LENGTH] - 1.0
     value, before, here = 0.0, 0.0, 1.0
     for k in range(scene.parts[SIZE, m, j]):
-        value += scene.vectors[Y, scene.parts[FIRST, m, j] + k] * here * (2.0 * k + 1.0) ** 0.5
+        value += scene.vectors[Y, scene.parts[FIRST, m, j] + k] * here * math.sqrt(2.0 * k + 1.0)
         before, here = here, ((2.0 * k + 1.0) * x * here - k * before) / (k + 1.0)
     return float(value / scene.held[SCALE, m, j])
 
@@ -180,7 +182,7 @@ def angle_at(scene: Scene, s: float, j: int) -> float:
     before, here = 1.0, x
     for k in range(1, scene.parts[SIZE, m, j]):  # int_0^x P_k = (L_(k+1) - L_(k-1)) / (2 sqrt(2 k + 1))
         after = ((2.0 * k + 1.0) * x * here - k * before) / (k + 1.0)
-        value += scene.vectors[Y, scene.parts[FIRST, m, j] + k] * (after - before) / (2.0 * (2.0 * k + 1.0) ** 0.5)
+        value += scene.vectors[Y, scene.parts[FIRST, m, j] + k] * (after - before) / (2.0 * math.sqrt(2.0 * k + 1.0))
         before, here = here, after
     return float(scene.held[ANGLE, m, j] + scene.held[SCALE, m, j] * value)
 

@@ -18,8 +18,7 @@ from ctr_pvs.kernel.arrays import Array
 from ctr_pvs.kernel.arrays import Ints
 from ctr_pvs.kernel.arrays import Kit
 from ctr_pvs.kernel.arrays import Y
-from ctr_pvs.kernel.arrays import bench_of
-from ctr_pvs.kernel.arrays import scene_of
+from ctr_pvs.kernel.arrays import kit_of
 from ctr_pvs.kernel.carry import carry
 from ctr_pvs.kernel.carry import drop_finer
 from ctr_pvs.kernel.compiler import compiled
@@ -67,7 +66,7 @@ def take_steps(
     numbers of their states into ``out`` (M W,), what ``alone.cold`` says into ``codes``; room (2, R) : for states.
     Rows whose code is not -1 are passed over, so that a TOO_SMALL call can be repeated.
     """
-    kit = Kit(tubes, segments, rules, floats, ints)
+    kit = kit_of(tubes, segments, rules, floats, ints)
     if len(codes) == 0:
         return step(kit, last, alpha, D, loads, tolerance, raised, floor, slack, untwisted, tip, out)
     N, width = len(segments), len(out) // len(codes)
@@ -91,8 +90,8 @@ def untwisted_state(
 ) -> int:  # fmt: skip
     """The state without twist at (alpha, D), eq. (28)-(31), and the estimate of what it neglects; NOT_PROVEN where it
     is not stable."""
-    kit = Kit(tubes, segments, rules, floats, ints)
-    scene, bench = scene_of(kit, 0), bench_of(kit)
+    kit = kit_of(tubes, segments, rules, floats, ints)
+    scene, bench = kit.scenes[0], kit.bench
     if not prepare(kit, scene, D, alpha[:0], tolerance, 0, 0):
         return TOO_SMALL
     for u in range(scene.counts[N_UNKNOWNS]):
@@ -114,8 +113,8 @@ def relaxed_state(
     """The relaxed robot at D: OK, MORE if others are as near to zero base angles, NOT_PROVEN if none was found.
 
     work (7, N) : room."""
-    kit = Kit(tubes, segments, rules, floats, ints)
-    scene, bench = scene_of(kit, 0), bench_of(kit)
+    kit = kit_of(tubes, segments, rules, floats, ints)
+    scene, bench = kit.scenes[0], kit.bench
     if not prepare(kit, scene, D, D[:0], tolerance, 0, floor):
         return TOO_SMALL
     found = relax(scene, bench, tubes, rules, work[6], work)
@@ -139,14 +138,14 @@ def land(
     then energies [J] before and after, NaN where point
     moments act.
     """
-    kit = Kit(tubes, segments, rules, floats, ints)
+    kit = kit_of(tubes, segments, rules, floats, ints)
     N = len(segments)
     alpha, D, loads = command[:N], command[N : 2 * N], command[2 * N :]
     begun = clock[2] > 0.0
     came = step_aside(kit, out if begun else state, D, loads, tolerance, floor)
     if came < 0:
         return TOO_SMALL
-    scene, bench = scene_of(kit, came), bench_of(kit)
+    scene, bench = kit.scenes[came], kit.bench
     drop_finer(scene, FINER)  # the path was followed without them, and its landing is to be
     if not begun:
         clock[0], clock[1], clock[2], clock[3] = 0.0, 0.1, AT_REST, energy_value(scene, tubes, rules, alpha)
@@ -165,7 +164,7 @@ def land(
     came = step_aside(kit, state, D, loads, tolerance, floor)
     if came < 0:
         return TOO_SMALL
-    scene = scene_of(kit, came)
+    scene = kit.scenes[came]
     for u in range(scene.counts[N_UNKNOWNS]):
         scene.vectors[OTHER, u] = out[STATE + 3 * N + len(loads) + u] - scene.vectors[Y, u]
     return OK if twist_size(scene, scene.vectors[OTHER], FINE) > NUDGE else NOT_PROVEN
@@ -181,7 +180,7 @@ def step_aside(
     from_scene = open_state(kit, state, tolerance)
     if from_scene < 0:
         return -1
-    old, new = scene_of(kit, from_scene), scene_of(kit, 1 - from_scene)
+    old, new = kit.scenes[from_scene], kit.scenes[1 - from_scene]
     if holds(old, D, loads, 0, floor):
         return from_scene
     if not prepare(kit, new, D, loads, tolerance, 0, floor):
@@ -196,8 +195,8 @@ def blank_state(
     floor: int, out: Array,
 ) -> int:  # fmt: skip
     """A state at (alpha, D) with degrees of at least ``floor`` and no twist, not solved for."""
-    kit = Kit(tubes, segments, rules, floats, ints)
-    scene = scene_of(kit, 0)
+    kit = kit_of(tubes, segments, rules, floats, ints)
+    scene = kit.scenes[0]
     if not prepare(kit, scene, D, alpha[:0], tolerance, 0, floor):
         return TOO_SMALL
     for u in range(scene.counts[N_UNKNOWNS]):

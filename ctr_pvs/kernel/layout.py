@@ -10,12 +10,10 @@ from ctr_pvs.kernel.arrays import ARC
 from ctr_pvs.kernel.arrays import AT
 from ctr_pvs.kernel.arrays import AT_X
 from ctr_pvs.kernel.arrays import BENDING
-from ctr_pvs.kernel.arrays import BLOCK
 from ctr_pvs.kernel.arrays import COUPLED
 from ctr_pvs.kernel.arrays import CUT
 from ctr_pvs.kernel.arrays import DEGREE
 from ctr_pvs.kernel.arrays import ELEMENTS
-from ctr_pvs.kernel.arrays import FACTORS
 from ctr_pvs.kernel.arrays import FIRST
 from ctr_pvs.kernel.arrays import FLOOR
 from ctr_pvs.kernel.arrays import FRAMED_ANGLE
@@ -32,7 +30,6 @@ from ctr_pvs.kernel.arrays import MU
 from ctr_pvs.kernel.arrays import MU_HERE
 from ctr_pvs.kernel.arrays import MU_SIZE
 from ctr_pvs.kernel.arrays import N_ELEMENTS
-from ctr_pvs.kernel.arrays import N_FACTORS
 from ctr_pvs.kernel.arrays import N_FAR
 from ctr_pvs.kernel.arrays import N_LOADS
 from ctr_pvs.kernel.arrays import N_NODES
@@ -72,7 +69,6 @@ from ctr_pvs.kernel.materials import is_curved
 from ctr_pvs.kernel.materials import pre_curvature
 from ctr_pvs.kernel.sections import FINER
 from ctr_pvs.kernel.sections import SAME_PLACE
-from ctr_pvs.kernel.sections import block_size
 from ctr_pvs.kernel.sections import cut_sections
 from ctr_pvs.kernel.sections import first_point
 from ctr_pvs.kernel.sections import mark_loaded
@@ -91,7 +87,7 @@ def fill_elements(
     for q in range(count):
         if sections.coupled[q]:
             last = q + 1
-    m, node, unknown, block, active = 0, 0, N, 0, 0
+    m, node, unknown, active = 0, 0, N, 0
     for q in range(count):
         here = sections.segment[q]
         h = (sections.start[q + 1] - sections.start[q]) / sections.parts[q]
@@ -100,8 +96,7 @@ def fill_elements(
             scene.line[m, ARC] = sections.start[q] + part * h
             scene.line[m, LENGTH], scene.line[m, STIFFNESS] = h, stiffness_of(tubes, here)
             scene.marks[m, COUPLED], scene.marks[m, DEGREE] = sections.coupled[q], degree
-            scene.marks[m, GAUSS], scene.marks[m, ROW], scene.marks[m, BLOCK] = G, node, block
-            first = unknown
+            scene.marks[m, GAUSS], scene.marks[m, ROW] = G, node
             for j in range(N):
                 i = here[j]
                 scene.parts[SEGMENT, m, j] = i
@@ -117,7 +112,6 @@ def fill_elements(
             scene.marks[m, LOADED], scene.marks[m, MU] = sections.loaded[q], unknown
             scene.marks[m, MU_SIZE] = degree + FINER + 1 if sections.loaded[q] else 0
             unknown += 2 * scene.marks[m, MU_SIZE]
-            block += block_size(unknown - first, lead, N)
             for g in range(G):
                 s = scene.line[m, ARC] + h * rules[G, g, PLACE]
                 scene.gauss[node, PLACE], scene.gauss[node, WEIGHT] = s, h * rules[G, g, WEIGHT]
@@ -137,7 +131,7 @@ def fill_elements(
         scene.base[AT, j] = D[j]
         scene.base[ROOT, j] = math.sqrt(guide_compliance(tubes, segments, j, D[j]))
     scene.counts[N_ELEMENTS], scene.counts[N_NODES], scene.counts[N_UNKNOWNS] = m, node, unknown
-    scene.counts[N_FACTORS], scene.counts[LAST_ACTIVE], scene.counts[LEAD] = block, active, lead
+    scene.counts[LAST_ACTIVE], scene.counts[LEAD] = active, lead
     scene.counts[LEADER] = leader(tubes, segments, scene)
 
 
@@ -218,16 +212,14 @@ def prepare(kit: Kit, scene: Scene, D: Array, loads: Array, tolerance: float, ra
         return False
     count = cut_sections(kit.tubes, kit.segments, D, loads, sections)
     mark_loaded(kit.tubes, D, loads, sections, count)
-    elements, nodes, unknowns, factors, widest = plan_sections(
+    elements, nodes, unknowns, widest = plan_sections(
         kit.tubes, D, sections, count, tolerance, raised, floor, scene.base[SWING]
     )
     if (
-        elements > ints[ELEMENTS] or nodes > ints[NODES] or unknowns > ints[UNKNOWNS] or factors > ints[FACTORS]
-        or widest > ints[WIDEST]
+        elements > ints[ELEMENTS] or nodes > ints[NODES] or unknowns > ints[UNKNOWNS] or widest > ints[WIDEST]
     ):  # fmt: skip
         ints[SECTIONS] = -ints[SECTIONS]
-        ints[ELEMENTS], ints[NODES], ints[UNKNOWNS], ints[FACTORS] = elements, nodes, unknowns, factors
-        ints[WIDEST] = widest
+        ints[ELEMENTS], ints[NODES], ints[UNKNOWNS], ints[WIDEST] = elements, nodes, unknowns, widest
         return False
     scene.base[FRAMED_ANGLE, 0] = math.nan
     fill_elements(kit.tubes, kit.segments, kit.rules, D, sections, count, scene)

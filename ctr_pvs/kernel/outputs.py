@@ -37,13 +37,9 @@ from ctr_pvs.kernel.arrays import WEIGHT
 from ctr_pvs.kernel.arrays import Array
 from ctr_pvs.kernel.arrays import Complex
 from ctr_pvs.kernel.arrays import Ints
-from ctr_pvs.kernel.arrays import Kit
 from ctr_pvs.kernel.arrays import Y
-from ctr_pvs.kernel.arrays import bench_of
-from ctr_pvs.kernel.arrays import scene_of
-from ctr_pvs.kernel.backbone.frames import bend
-from ctr_pvs.kernel.backbone.frames import chain
-from ctr_pvs.kernel.backbone.frames import is_framed
+from ctr_pvs.kernel.arrays import kit_of
+from ctr_pvs.kernel.backbone.frames import put_frames
 from ctr_pvs.kernel.backbone.poses import trace
 from ctr_pvs.kernel.carry import angle_at
 from ctr_pvs.kernel.carry import guide_torque
@@ -73,11 +69,11 @@ def margin(
     tubes: Array, segments: Ints, rules: Array, floats: Array, ints: Ints, state: Array, tolerance: float
 ) -> float:
     """The stability margin of ``state``; NaN if the workspace is too small."""
-    kit = Kit(tubes, segments, rules, floats, ints)
+    kit = kit_of(tubes, segments, rules, floats, ints)
     which = open_state(kit, state, tolerance)
     if which < 0:
         return math.nan
-    return stability_margin(scene_of(kit, which), bench_of(kit), tubes, rules, state[STATE : STATE + len(segments)])
+    return stability_margin(kit.scenes[which], kit.bench, tubes, rules, state[STATE : STATE + len(segments)])
 
 
 @entry_point(f"int64({WORKSPACE}, float64[::1], float64, float64[:, ::1])")
@@ -86,16 +82,14 @@ def loads(
 ) -> int:
     """Actuation loads and energy of ``state`` into out (6, N): torque, force towards +D and -D, kinks; then elastic
     energy [J], and the work of the loads' forces [J]."""
-    kit = Kit(tubes, segments, rules, floats, ints)
+    kit = kit_of(tubes, segments, rules, floats, ints)
     N = len(segments)
     which = open_state(kit, state, tolerance)
     if which < 0:
         return TOO_SMALL
-    scene, bench = scene_of(kit, which), bench_of(kit)
+    scene, bench = kit.scenes[which], kit.bench
     energy_gradient(scene, bench, tubes, rules, state[STATE : STATE + N])
-    bend(scene, rules)
-    if not is_framed(scene):
-        chain(scene, tubes, rules)
+    put_frames(scene, tubes, rules, True)
     actuation_loads(scene, bench, tubes, segments, state[S_TWISTS] == TWISTED, out)
     out[4, 0] += twist_energy(scene) + out[5, 0]
     out[5, 0] = forces_work(scene) if scene.counts[LEAD] > 0 else 0.0
@@ -107,11 +101,11 @@ def base_wrench(
     tubes: Array, segments: Ints, rules: Array, floats: Array, ints: Ints, state: Array, tolerance: float, out: Array
 ) -> int:
     """Force [N] and moment [N m] about the orifice that all beyond it exerts there, into out (6,)."""
-    kit = Kit(tubes, segments, rules, floats, ints)
+    kit = kit_of(tubes, segments, rules, floats, ints)
     which = open_state(kit, state, tolerance)
     if which < 0:
         return TOO_SMALL
-    scene, bench = scene_of(kit, which), bench_of(kit)
+    scene, bench = kit.scenes[which], kit.bench
     energy_gradient(scene, bench, tubes, rules, state[STATE : STATE + len(segments)])
     M = scene.counts[N_ELEMENTS]
     for i in range(3):
@@ -130,11 +124,11 @@ def jacobian(
     Under load, with force and moment on the tip into the last rows of ``out``, and those of torques and forces into
     actuation (2 N, 6).  NOT_PROVEN where the state is not stable.
     """
-    kit = Kit(tubes, segments, rules, floats, ints)
+    kit = kit_of(tubes, segments, rules, floats, ints)
     which = open_state(kit, state, tolerance)
     if which < 0:
         return TOO_SMALL
-    scene, bench = scene_of(kit, which), bench_of(kit)
+    scene, bench = kit.scenes[which], kit.bench
     energy_gradient(scene, bench, tubes, rules, state[STATE : STATE + len(segments)])
     twists = state[S_TWISTS] != RIGID
     if twists and not factorize(scene, bench, rules, FINE, EXACT, 0.0, 0.0, -1.0):
@@ -142,8 +136,7 @@ def jacobian(
     for j in range(len(segments)):
         bench.lines[TORQUES, j] = scene.held[TORQUE, 0, j] if twists else 0.0
     if scene.counts[LEAD] == 0:
-        bend(scene, rules)
-        chain(scene, tubes, rules)
+        put_frames(scene, tubes, rules, True)
     else:
         load_rates(scene, bench, tubes, segments, rules, out[2 * len(segments) :])
     command_rates(scene, bench, tubes, segments, rules, twists, out, gain, actuation)
@@ -157,16 +150,14 @@ def backbone(
 ) -> int:  # fmt: skip
     """Poses of a tube's material, the leader's if ``tube`` < 0, at increasing arc lengths s (n,) [m]: position (n, 3)
     [m] and unit quaternions x, y, z, w (n, 4)."""
-    kit = Kit(tubes, segments, rules, floats, ints)
+    kit = kit_of(tubes, segments, rules, floats, ints)
     N = len(segments)
     which = open_state(kit, state, tolerance)
     if which < 0:
         return TOO_SMALL
-    scene, bench = scene_of(kit, which), bench_of(kit)
+    scene, bench = kit.scenes[which], kit.bench
     spread_angles(scene, state[STATE : STATE + N], scene.vectors[Y])
-    if not is_framed(scene):
-        bend(scene, rules)
-        chain(scene, tubes, rules)
+    put_frames(scene, tubes, rules, False)
     trace(scene, bench, tubes, rules, scene.counts[LEADER] if tube < 0 else tube, s, position, orientation)
     return OK
 
@@ -178,12 +169,12 @@ def angles(
 ) -> int:  # fmt: skip
     """psi (n, N) [rad] and torques (n, N) [N m] of all tubes at arc lengths s (n,) [m]; before the orifice, at s < 0,
     those in the guide."""
-    kit = Kit(tubes, segments, rules, floats, ints)
+    kit = kit_of(tubes, segments, rules, floats, ints)
     N = len(segments)
     which = open_state(kit, state, tolerance)
     if which < 0:
         return TOO_SMALL
-    scene = scene_of(kit, which)
+    scene = kit.scenes[which]
     spread_angles(scene, state[STATE : STATE + N], scene.vectors[Y])
     for g in range(len(s)):
         for j in range(N):
@@ -198,11 +189,11 @@ def elements(
 ) -> int:
     """Start and end [m] of the elements of ``state``, 1 where tubes are coupled, and the degree there, into out (E, 4);
     how many there are, -1 if the workspace is too small."""
-    kit = Kit(tubes, segments, rules, floats, ints)
+    kit = kit_of(tubes, segments, rules, floats, ints)
     which = open_state(kit, state, tolerance)
     if which < 0:
         return -1
-    scene = scene_of(kit, which)
+    scene = kit.scenes[which]
     M = scene.counts[N_ELEMENTS]
     for m in range(min(M, len(out))):
         out[m, 0], out[m, 1] = scene.line[m, ARC], scene.line[m + 1, ARC]
@@ -215,17 +206,16 @@ def describe(
     tubes: Array, segments: Ints, rules: Array, floats: Array, ints: Ints, state: Array, tolerance: float, out: Array
 ) -> int:
     """``state``, stable or not, with its torques, residual and tip, into ``out``; its estimate is NaN."""
-    kit = Kit(tubes, segments, rules, floats, ints)
+    kit = kit_of(tubes, segments, rules, floats, ints)
     N = len(segments)
     which = open_state(kit, state, tolerance)
     if which < 0:
         return TOO_SMALL
-    scene, bench = scene_of(kit, which), bench_of(kit)
+    scene, bench = kit.scenes[which], kit.bench
     alpha = state[STATE : STATE + N]
     energy_gradient(scene, bench, tubes, rules, alpha)
     if not write_state(scene, alpha, int(state[S_STEPS]), TWISTED, out):
         return TOO_SMALL
-    bend(scene, rules)
     put_tip(scene, tubes, rules, out)
     out[S_ESTIMATE] = math.nan
     return OK
@@ -242,12 +232,12 @@ def dense_map(
     times the unknowns; moment (G, N) K kappa* [N m], share (G,) weight over sum of K [1/(N m)], place (G,)
     their arc lengths [m].  How many Gauss points, -1 if the
     workspace is too small; arrays that are too short are not filled."""
-    kit = Kit(tubes, segments, rules, floats, ints)
+    kit = kit_of(tubes, segments, rules, floats, ints)
     N = len(segments)
     which = open_state(kit, state, tolerance)
     if which < 0:
         return -1
-    scene = scene_of(kit, which)
+    scene = kit.scenes[which]
     count = 0
     for m in range(scene.counts[N_ELEMENTS]):
         count += scene.marks[m, GAUSS] if scene.marks[m, COUPLED] else 0

@@ -149,11 +149,11 @@ def nodes_for_turn(turn: float, relative: float) -> int:
 @compiled
 def plan_sections(
     tubes: Array, D: Array, sections: Sections, count: int, tolerance: float, raised: int, floor: int, reach: Array
-) -> tuple[int, int, int, int, int]:
+) -> tuple[int, int, int, int]:
     """Fills parts, degree, nodes and coupled of the first ``count`` sections, of which ``loaded`` is known.
 
     tolerance [m] of the tip; ``raised`` degrees more than its first choice, and no less than ``floor``.  Returns how
-    many elements, Gauss points, unknowns, factors and rows of one matrix all sections need; ``swing`` of the scene into
+    many elements, Gauss points, unknowns and rows of one matrix all sections need; ``swing`` of the scene into
     reach (1,) [m].
     """
     N = len(D)
@@ -170,7 +170,7 @@ def plan_sections(
     reach[0] = swing
     lead = 3 if count > 0 and sections.loaded[0] else 0
     widest = max(N + 3, AXIAL)  # ``row`` of the bench also takes the nine numbers of three axes
-    elements, nodes, unknowns, factors, active_beyond = 0, 0, N, 0, False
+    elements, nodes, unknowns, active_beyond = 0, 0, N, False
     for q in range(count - 1, -1, -1):
         a, b = sections.start[q], sections.start[q + 1]
         here = sections.segment[q]
@@ -225,17 +225,8 @@ def plan_sections(
         elements += parts
         nodes += parts * count_nodes
         unknowns += parts * size
-        factors += parts * block_size(size, lead, N)
         widest = max(widest, size + lead + N)
-    return elements, nodes, unknowns, factors, widest
-
-
-@compiled
-def block_size(size: int, lead: int, tubes: int) -> int:
-    """Floats that an element of ``size`` unknowns takes in ``factors``: its matrix, a right-hand side, and how its end
-    turns with its unknowns."""
-    wide = size + lead + tubes
-    return wide * wide + wide + lead * wide
+    return elements, nodes, unknowns, widest
 
 
 @compiled

@@ -17,6 +17,7 @@ from ctr_pvs.errors import CommandError
 from ctr_pvs.errors import RobotError
 
 GEOMETRIC_SLACK = 1e-12  # m; less than this apart is the same place
+FLOAT = np.dtype(np.float64)  # numpy has one such object for all arrays of floats in the machine's byte order
 LARGEST_ALPHA = 1e6  # rad; beyond it the spacing of floating-point numbers shows in the tip
 
 Range: TypeAlias = tuple[float, float]
@@ -52,6 +53,7 @@ class CommandBounds:
             (0.0, length) if limit is None else (max(limit[0], 0.0), min(limit[1], length))
             for length, limit in zip(lengths, D_limits, strict=True)
         ]
+        self._ranges = [(*a, *d) for a, d in zip(self._alpha_ranges, self._D_ranges, strict=True)]
         self._check_that_a_command_exists()
         # With D in order, tube j is held up by the lower bounds of the tubes before it and down by the upper bounds of
         # the tubes after it. These ranges rise from tube to tube, so clipping to them keeps the order.
@@ -80,12 +82,10 @@ class CommandBounds:
 
     def _plainly_good(self, alpha: NDArray[np.float64], D: NDArray[np.float64]) -> bool:
         """True for what nearly every command is: arrays of floats, all well within the bounds."""
-        if alpha.dtype != np.float64 or D.dtype != np.float64 or alpha.shape != self._shape or D.shape != self._shape:
+        if alpha.dtype is not FLOAT or D.dtype is not FLOAT or alpha.shape != self._shape or D.shape != self._shape:
             return False
         previous = 0.0
-        for angle, depth, (lowest, highest), (low, high) in zip(
-            alpha.tolist(), D.tolist(), self._alpha_ranges, self._D_ranges, strict=True
-        ):
+        for angle, depth, (lowest, highest, low, high) in zip(alpha.tolist(), D.tolist(), self._ranges, strict=True):
             if not (lowest <= angle <= highest and low <= depth <= high and previous <= depth):
                 return False
             previous = depth

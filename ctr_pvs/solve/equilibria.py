@@ -238,7 +238,9 @@ class _Polish:
             state = energy.state(y, self.alpha)
             tip = state.tip[:3]
             if before is not None:
-                state.vector[S_ESTIMATE], state.vector[S_STEPS] = np.linalg.norm(tip - before), spent
+                vector = state.vector
+                vector[S_ESTIMATE], vector[S_STEPS] = np.linalg.norm(tip - before), spent
+                state = State(vector, len(self.alpha))
                 best = self._told(energy, y, state)
                 if state.estimate <= self.engine.tolerance:
                     break

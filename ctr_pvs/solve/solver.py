@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 from numpy.typing import NDArray
 
-from ctr_pvs.answer.degrees import missed
 from ctr_pvs.answer.degrees import raised
 from ctr_pvs.answer.degrees import settled
 from ctr_pvs.answer.engine import Engine
@@ -220,10 +219,9 @@ class EquilibriumSolver:
         if start == "cold" or self._last is None:
             return self._cold(at, packed, deadline)
         code, vector = self._engine.step(self._last.vector, alpha, D, packed, untwisted=self._untwisted)
-        if code == OK and missed(self._engine, vector):
-            code, vector = raised(self._engine, vector, alpha, D, packed)
-        if code == OK:
-            return self._keep(at, State(vector, len(alpha)), (), 0, "")
+        state = raised(self._engine, State(vector, len(alpha)), alpha, D, packed) if code == OK else None
+        if state is not None:
+            return self._keep(at, state, (), 0, "")
         legs = warm_legs(self.robot, self._last, self._acting, alpha, D, loads)
         return self._travelled(self._last, legs, at, packed, deadline, "")
 

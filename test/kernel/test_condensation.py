@@ -15,6 +15,7 @@ from test_element import scene_of
 from ctr_pvs import EquilibriumSolver
 from ctr_pvs.kernel import arrays
 from ctr_pvs.kernel.twist.element import EXACT
+from ctr_pvs.kernel.twist.margin import largest_eigenvalue
 from ctr_pvs.kernel.twist.newton import newton_step
 from ctr_pvs.kernel.walk.step import NOT_PROVEN
 from ctr_pvs.kernel.walk.step import OK
@@ -26,8 +27,8 @@ UNSTABLE = -1.0
 def newton_step_of_kernel(engine, state, turned, finer):
     """The step (U,) that the kernel takes from any ``state`` while the bases turn by ``turned`` (N,) [rad]; None if it
     finds the Hessian not positive definite."""
-    kit = arrays.Kit(*engine.fixed())
-    scene, bench = arrays.scene_of(kit, open_state(kit, state.vector, engine.tolerance)), arrays.bench_of(kit)
+    kit = arrays.kit_of(*engine.fixed())
+    scene, bench = kit.scenes[open_state(kit, state.vector, engine.tolerance)], kit.bench
     good = newton_step(scene, bench, kit.tubes, kit.rules, state.alpha, turned, finer, EXACT, 0.0)
     return scene.vectors[arrays.STEP, : len(state.unknowns)].copy() if good else None
 
@@ -127,3 +128,15 @@ def test_an_answer_balances_the_whole_gradient(seed, tolerance):
     assert answer.stability_margin == pytest.approx(min(1.0, least), abs=1e-10)
     if answer.degrees_of_freedom:
         assert answer.degrees_of_freedom == np.count_nonzero(counts) - np.count_nonzero(answer.D == 0.0)
+
+
+def test_the_largest_eigenvalue_of_a_growing_tridiagonal_matrix():
+    """As Lanczos asks for it, row by row; also where two eigenvalues nearly meet."""
+    rng = np.random.default_rng(12)
+    for scale in (1.0, 1e-3, 1e-9):
+        diagonal, side = rng.uniform(0.1, 2.0, 12), scale * rng.uniform(0.1, 1.0, 12)
+        largest = 0.0
+        for n in range(1, 13):
+            T = np.diag(diagonal[:n]) + np.diag(side[: n - 1], 1) + np.diag(side[: n - 1], -1)
+            largest = largest_eigenvalue(diagonal, side, n, largest)
+            assert largest == pytest.approx(np.linalg.eigvalsh(T)[-1], rel=1e-14)

@@ -18,6 +18,7 @@ from ctr_pvs import Segment
 from ctr_pvs import Tube
 from ctr_pvs.answer.engine import Engine
 from ctr_pvs.answer.shape import TorsionShape
+from ctr_pvs.kernel.twist.element import ALONG
 from ctr_pvs.kernel.twist.element import EXACT
 from ctr_pvs.kernel.twist.element import LOWERED
 from ctr_pvs.kernel.twist.element import WIDER
@@ -144,17 +145,35 @@ def test_lowered_cosines_bound_the_springs():
         moved = rng.choice([1e-9, 1e-3, 9e-3, 0.1, 1.0, 3.0]) * rng.uniform(-1.0, 1.0)
         slack = rng.choice([1e-9, 1e-6, 1e-3, 0.05, 0.5])
         exact = (np.conj(b) * c).real
-        assert spring(b, c, moved, slack, EXACT) == pytest.approx(exact, abs=1e-15)
-        bound = spring(b, c, moved, slack, LOWERED)
+        assert spring(np.conj(b) * c, moved, slack, EXACT) == pytest.approx(exact, abs=1e-15)
+        bound = spring(np.conj(b) * c, moved, slack, LOWERED)
         # ``b`` and ``c`` are the present ones; the angle between them was less by ``moved``.
         low, high = min(-moved, 0.0), max(-moved, 0.0)
         room = WIDER * abs(moved) + slack
         within = np.linspace(low - room, high + room, 41)
         least = (np.conj(b) * c * np.exp(1j * within)).real.min()
         assert bound <= least + 1e-12
-        assert spring(b, c, moved, slack, WORST) <= bound <= exact + 1e-15
+        assert spring(np.conj(b) * c, moved, slack, WORST) <= bound <= exact + 1e-15
         if room + high - low < 0.05:  # and the bound is no cruder than it must be
             assert bound >= exact - 2.0 * abs(b) * abs(c) * (abs(moved) + slack)
+
+
+def test_what_stands_for_springs_at_two_ends_bounds_them_along_the_way():
+    """On the straight way between two angles, and ``strayed`` to either side of it, no spring is weaker than the mean
+    of what stands for it at both ends."""
+    rng = np.random.default_rng(6)
+    for _ in range(3000):
+        b, c = rng.uniform(0.0, 2.0, 2) * np.exp(1j * rng.uniform(-3.2, 3.2, 2))
+        moved = rng.choice([1e-9, 1e-3, 0.1, 1.0, 3.0]) * rng.uniform(-1.0, 1.0)
+        strayed = rng.choice([1e-9, 1e-3, 0.05, 0.5])
+        begin, end = np.conj(b) * c, np.conj(b) * c * np.exp(1j * moved)
+        bounds = [spring(product, moved, strayed, ALONG) for product in (begin, end)]
+        t = np.linspace(0.0, 1.0, 21)[:, None]
+        off = strayed * np.linspace(-1.0, 1.0, 21)
+        springs = (begin * np.exp(1j * (moved * t + off))).real
+        assert ((1.0 - t) * bounds[0] + t * bounds[1] <= springs + 1e-12).all()
+        if abs(moved) + strayed < 0.01:  # what is left out is small of second order, but for the straying
+            assert bounds[0] >= begin.real - abs(begin) * (strayed + moved**2 + strayed**2)
 
 
 @pytest.mark.parametrize("nodes", [1, 2, 9, 17, MOST_NODES])

@@ -50,12 +50,12 @@ class Loaded:
     ) -> None:
         engine = Engine(robot, TOLERANCE)
         packed = packed_loads(robot, D, loads)
-        self.kit = arrays.Kit(*engine.fixed())
-        while not prepare(self.kit, arrays.scene_of(self.kit, 0), D, packed, TOLERANCE, 0, degree):
+        self.kit = arrays.kit_of(*engine.fixed())
+        while not prepare(self.kit, self.kit.scenes[0], D, packed, TOLERANCE, 0, degree):
             engine.grow()
-            self.kit = arrays.Kit(*engine.fixed())
+            self.kit = arrays.kit_of(*engine.fixed())
         self.robot, self.alpha = robot, alpha
-        self.scene, self.bench = arrays.scene_of(self.kit, 0), arrays.bench_of(self.kit)
+        self.scene, self.bench = self.kit.scenes[0], self.kit.bench
         self.n = int(self.scene.counts[arrays.N_UNKNOWNS])
         rng = np.random.default_rng([seed, 3])
         # Unknowns that only check, those of bending, and those of low degree.

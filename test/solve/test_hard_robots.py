@@ -24,7 +24,7 @@ HARD = {
 }
 
 
-@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.soak) if "100" in n else n for n in HARD])
+@pytest.mark.parametrize("name", HARD)
 def test_hard_cases_turn_through_everything(name):
     """A whole turn and back in uneven steps: every answer is stable and flagged, or fails with a reason."""
     robot, D = HARD[name]()

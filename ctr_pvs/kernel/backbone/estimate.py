@@ -87,7 +87,7 @@ def swing(scene: Scene, bench: Bench, tubes: Array, m: int, change: Array) -> No
 def through_coupled(scene: Scene, bench: Bench, rules: Array, m: int, change: Array) -> float:
     """Carries phi and dr over a coupled element; the most [m] that a Gauss point of it moves."""
     G, h, first_row = scene.marks[m, GAUSS], scene.line[m, LENGTH], scene.marks[m, ROW]
-    phi, motion, t, here, moved, total = bench.space
+    phi, motion = bench.space[0], bench.space[1]
     rates, tangents = bench.sites[0], bench.sites[1]
     angles_inside(scene, rules, m, bench.lines[BENT], change, scene.turns[PSI])
     A, B = scene.frame[m, 0], scene.frame[m, 1]
@@ -104,25 +104,23 @@ def through_coupled(scene: Scene, bench: Bench, rules: Array, m: int, change: Ar
         x, yz = turned_vector(a, b, 1.0, 0j)
         tangents[g, 0], tangents[g, 1], tangents[g, 2] = x, yz.real, yz.imag
     for g in range(G):  # dr' = phi x t in place of the tangents
-        for i in range(3):
-            here[i] = phi[i]
-            t[i] = tangents[g, i]
+        x, y, z = phi[0], phi[1], phi[2]
         for k in range(G):
             w = h * rules[G, g, INTERPOLANT + k]
-            for i in range(3):
-                here[i] += w * rates[k, i]
-        cross(here, t, moved)
-        for i in range(3):
-            tangents[g, i] = moved[i]
+            x += w * rates[k, 0]
+            y += w * rates[k, 1]
+            z += w * rates[k, 2]
+        tx, ty, tz = tangents[g, 0], tangents[g, 1], tangents[g, 2]
+        tangents[g, 0], tangents[g, 1], tangents[g, 2] = y * tz - z * ty, z * tx - x * tz, x * ty - y * tx
     most = 0.0
     for g in range(G):
-        for i in range(3):
-            total[i] = motion[i]
+        x, y, z = motion[0], motion[1], motion[2]
         for k in range(G):
             w = h * rules[G, g, INTERPOLANT + k]
-            for i in range(3):
-                total[i] += w * tangents[k, i]
-        most = max(most, math.sqrt(total[0] ** 2 + total[1] ** 2 + total[2] ** 2))
+            x += w * tangents[k, 0]
+            y += w * tangents[k, 1]
+            z += w * tangents[k, 2]
+        most = max(most, math.sqrt(x * x + y * y + z * z))
     for g in range(G):
         w = h * rules[G, g, 1]
         for i in range(3):

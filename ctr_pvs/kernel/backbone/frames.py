@@ -57,13 +57,23 @@ MOST_ROUNDS, LAST_CHANGE = 60, 1e-12
 
 
 @compiled
-def bend(scene: Scene, rules: Array) -> None:
+def put_frames(scene: Scene, tubes: Array, rules: Array, turned: bool) -> None:
+    """Curvature, frames and positions for ``y`` and ``angle``, unless they stand there: an answer is often asked for
+    its backbone right after it was solved.  turned : see ``bend``."""
+    if not is_framed(scene):
+        bend(scene, rules, turned)
+        chain(scene, tubes, rules)
+
+
+@compiled
+def bend(scene: Scene, rules: Array, turned: bool) -> None:
     """Curvature at all Gauss points of ``scene`` for its ``y`` and ``angle``: eq. (26) point by point, and what the
-    loads add."""
+    loads add.  turned : the turned moments of coupled elements are those of ``y``, as a gradient leaves them."""
     scene.base[FRAMED_ANGLE, 0] = math.nan
     for m in range(scene.counts[N_ELEMENTS]):
-        angles_inside(scene, rules, m, scene.held[ANGLE, m], scene.vectors[Y], scene.turns[PSI])
-        turn_moments(scene, m)
+        if not (turned and scene.marks[m, COUPLED]):
+            angles_inside(scene, rules, m, scene.held[ANGLE, m], scene.vectors[Y], scene.turns[PSI])
+            turn_moments(scene, m)
         for g in range(scene.marks[m, GAUSS]):
             row = scene.marks[m, ROW] + g
             total = 0j
@@ -126,18 +136,19 @@ def collocate(scene: Scene, rules: Array, m: int) -> tuple[complex, complex, flo
     for _ in range(MOST_ROUNDS):
         change = 0.0
         for g in range(G):
-            scene.bends[row + g, TRIAL] = 0.5 * h * (scene.bends[row + g, BEND] * spinor[row + g, 0])
+            spinor[row + g, 1], scene.bends[row + g, TRIAL] = 0.0, 1.0
+        for j in range(G):  # column by column: sums that do not wait for one another
+            rate = 0.5 * h * (scene.bends[row + j, BEND] * spinor[row + j, 0])
+            for g in range(G):
+                w = rules[G, g, INTERPOLANT + j]
+                spinor[row + g, 1] += complex(w * rate.real, w * rate.imag)
+        for j in range(G):
+            rate = -0.5 * h * (scene.bends[row + j, BEND].conjugate() * spinor[row + j, 1])
+            for g in range(G):
+                w = rules[G, g, INTERPOLANT + j]
+                scene.bends[row + g, TRIAL] += complex(w * rate.real, w * rate.imag)
         for g in range(G):
-            b = 0j
-            for j in range(G):
-                b += rules[G, g, INTERPOLANT + j] * scene.bends[row + j, TRIAL]
-            spinor[row + g, 1] = b
-        for g in range(G):
-            scene.bends[row + g, TRIAL] = 0.5 * h * (scene.bends[row + g, BEND].conjugate() * spinor[row + g, 1])
-        for g in range(G):
-            a = 1.0 + 0j
-            for j in range(G):
-                a -= rules[G, g, INTERPOLANT + j] * scene.bends[row + j, TRIAL]
+            a = scene.bends[row + g, TRIAL]
             change = max(change, abs(a.real - spinor[row + g, 0].real) + abs(a.imag - spinor[row + g, 0].imag))
             spinor[row + g, 0] = a
         if change < LAST_CHANGE:
@@ -196,8 +207,7 @@ def chain(scene: Scene, tubes: Array, rules: Array) -> None:
 
 @compiled
 def is_framed(scene: Scene) -> bool:
-    """True if the frames in ``scene`` are those of its unknowns and angles: an answer is often asked for its backbone
-    right after it was solved, and then they need not be made again."""
+    """True if the frames in ``scene`` are those of its unknowns and angles."""
     for j in range(scene.base.shape[1]):
         if scene.base[FRAMED_ANGLE, j] != scene.held[ANGLE, 0, j]:
             return False

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from ctr_pvs.kernel.arrays import ANGLE
 from ctr_pvs.kernel.arrays import ARC
 from ctr_pvs.kernel.arrays import BEND
@@ -29,39 +31,44 @@ from ctr_pvs.kernel.compiler import compiled
 
 @compiled
 def expand_rates(scene: Scene, bench: Bench, rules: Array, m: int) -> int:
-    """Legendre coefficients of the rates of a, b and the position along element m, times its length, into
-    ``bench.series`` (7 of each degree); how many degrees."""
+    """Legendre series of a, b and the position along element m, of their rates times its length, into ``bench.series``
+    (7 of each degree), divided by what ``inside`` would divide by; how many degrees."""
     G, row, h = scene.marks[m, GAUSS], scene.marks[m, ROW], scene.line[m, LENGTH]
     count = min(G, HIGHEST_DEGREE + 1)
     for k in range(count):
         for i in range(7):
             bench.series[k, i] = 0.0
-        for g in range(G):
+    for g in range(G):
+        a, b, bend = scene.bends[row + g, SPINOR], scene.bends[row + g, SPINOR + 1], scene.bends[row + g, BEND]
+        a_rate, b_rate, across = -0.5 * bend.conjugate() * b, 0.5 * bend * a, -2j * a * b
+        along = a.real * a.real + a.imag * a.imag - b.real * b.real - b.imag * b.imag
+        for k in range(count):
             w = h * rules[G, g, WEIGHT] * rules[G, g, POLYNOMIAL + k]
-            a, b, bend = scene.bends[row + g, SPINOR], scene.bends[row + g, SPINOR + 1], scene.bends[row + g, BEND]
-            a_rate, b_rate, across = -0.5 * w * bend.conjugate() * b, 0.5 * w * bend * a, -2j * w * a * b
-            bench.series[k, 0] += a_rate.real
-            bench.series[k, 1] += a_rate.imag
-            bench.series[k, 2] += b_rate.real
-            bench.series[k, 3] += b_rate.imag
-            bench.series[k, 4] += w * (a.real * a.real + a.imag * a.imag - b.real * b.real - b.imag * b.imag)
-            bench.series[k, 5] += across.real
-            bench.series[k, 6] += across.imag
+            bench.series[k, 0] += w * a_rate.real
+            bench.series[k, 1] += w * a_rate.imag
+            bench.series[k, 2] += w * b_rate.real
+            bench.series[k, 3] += w * b_rate.imag
+            bench.series[k, 4] += w * along
+            bench.series[k, 5] += w * across.real
+            bench.series[k, 6] += w * across.imag
+    for k in range(1, count):
+        for i in range(7):
+            bench.series[k, i] /= 2.0 * math.sqrt(2.0 * k + 1.0)
     return count
 
 
 @compiled
 def inside(bench: Bench, count: int, x: float, out: Array) -> None:
-    """Integrals from 0 to x in [0, 1] of the ``count`` Legendre series of ``bench.series`` into ``out`` (7,)."""
+    """Integrals from 0 to x in [0, 1] of the rates that ``expand_rates`` has made ``count`` series of, into ``out``
+    (7,)."""
     y = 2.0 * x - 1.0
     for i in range(7):
         out[i] = bench.series[0, i] * x
     before, here = 1.0, y
     for k in range(1, count):  # int_0^x P_k = (L_(k+1) - L_(k-1)) / (2 sqrt(2 k + 1))
         after = ((2.0 * k + 1.0) * y * here - k * before) / (k + 1.0)
-        integral = (after - before) / (2.0 * (2.0 * k + 1.0) ** 0.5)
         for i in range(7):
-            out[i] += bench.series[k, i] * integral
+            out[i] += bench.series[k, i] * (after - before)
         before, here = here, after
 
 

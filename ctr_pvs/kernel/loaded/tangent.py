@@ -33,7 +33,6 @@ from ctr_pvs.kernel.arrays import Scene
 from ctr_pvs.kernel.backbone.frames import cross
 from ctr_pvs.kernel.backbone.frames import tangent
 from ctr_pvs.kernel.compiler import compiled
-from ctr_pvs.kernel.twist.condensation import block_of
 from ctr_pvs.kernel.twist.condensation import substitute
 from ctr_pvs.kernel.twist.fields import BENDING_ONLY
 from ctr_pvs.kernel.twist.fields import counted
@@ -129,7 +128,7 @@ def turns_at_ends(scene: Scene, bench: Bench, which: int, v: Array, turned: Arra
         if not scene.marks[m, LOADED]:
             continue
         n = counted(scene, m, which)
-        end = block_of(scene, bench, m, n + 3 + N).end
+        end = bench.swings[m]
         for i in range(3):
             s = out[m, i]
             for j in range(N):
@@ -156,7 +155,7 @@ def gather_pushes(scene: Scene, bench: Bench, which: int, pushes: Array, out: Ar
         for i in range(3 + N):
             force[i] += pushes[m + 1, i]
         n, row = counted(scene, m, which), 0
-        end = block_of(scene, bench, m, n + 3 + N).end
+        end = bench.swings[m]
         for field in range(N + 2):
             first, size = field_of(scene, m, field, which)
             whole = scene.parts[SIZE, m, field] if field < N else scene.marks[m, MU_SIZE]

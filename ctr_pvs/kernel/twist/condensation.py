@@ -9,12 +9,10 @@ if and only if the whole Hessian is positive definite: stability comes with the 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 from ctr_pvs.kernel.arrays import BASE
 from ctr_pvs.kernel.arrays import BENT
 from ctr_pvs.kernel.arrays import BEYOND
-from ctr_pvs.kernel.arrays import BLOCK
 from ctr_pvs.kernel.arrays import FORCE
 from ctr_pvs.kernel.arrays import LAST_ACTIVE
 from ctr_pvs.kernel.arrays import LEAD
@@ -113,7 +111,7 @@ def factorize(
         stiffen_by_moments(scene, bench, m + 1)
         n = counted(scene, m, which)
         wide = n + ends
-        A = block_of(scene, bench, m, wide).matrix
+        A = bench.factors[m]
         for i in range(wide):
             for k in range(i + 1):
                 A[i, k] = 0.0
@@ -130,26 +128,6 @@ def factorize(
                 P[i, k] = A[n + i, n + k]
                 P[k, i] = A[n + i, n + k]
     return close_base(scene, bench, which, shift, base_shift)
-
-
-class Block(NamedTuple):
-    """Of one element: its matrix (W, W), W its unknowns and its start; a right-hand side (W,); under load, how the
-    frame at its end turns with its unknowns and its start, (3, W)."""
-
-    matrix: Array
-    vector: Array
-    end: Array
-
-
-@compiled
-def block_of(scene: Scene, bench: Bench, m: int, wide: int) -> Block:
-    """Where element m, of ``wide`` rows, is kept."""
-    o, lead = scene.marks[m, BLOCK], scene.counts[LEAD]
-    matrix = bench.factors[o : o + wide * wide].reshape(wide, wide)
-    o += wide * wide
-    return Block(
-        matrix, bench.factors[o : o + wide], bench.factors[o + wide : o + (1 + lead) * wide].reshape(lead, wide)
-    )
 
 
 @compiled
@@ -179,7 +157,7 @@ def add_frame_beyond(scene: Scene, bench: Bench, m: int, which: int, n: int, A: 
     P = bench.squares[BEYOND]
     spread = spread_of(bench, wide)
     end, work = spread.end, spread.work
-    kept = block_of(scene, bench, m, wide).end
+    kept = bench.swings[m]
     for i in range(3):
         for a in range(wide):
             kept[i, a] = end[i, a]
@@ -246,7 +224,7 @@ def substitute(scene: Scene, bench: Bench, which: int, rhs: Array, turned: Array
         force[i] = 0.0
     for m in range(scene.counts[LAST_ACTIVE] - 1, -1, -1):
         n = counted(scene, m, which)
-        L, x, end = block_of(scene, bench, m, n + ends)
+        L, x, end = bench.factors[m], bench.sides[m], bench.swings[m]
         row = 0
         for field in range(N + 2):
             first, size = field_of(scene, m, field, which)
@@ -270,7 +248,7 @@ def substitute(scene: Scene, bench: Bench, which: int, rhs: Array, turned: Array
     turn_base(scene, bench, which, rhs, turned, out, free)
     for m in range(scene.counts[LAST_ACTIVE]):
         n = counted(scene, m, which)
-        L, x, end = block_of(scene, bench, m, n + ends)
+        L, x, end = bench.factors[m], bench.sides[m], bench.swings[m]
         for k in range(n):
             s = x[k]
             for i in range(ends):

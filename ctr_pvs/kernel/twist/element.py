@@ -33,7 +33,6 @@ from ctr_pvs.kernel.arrays import ROOT
 from ctr_pvs.kernel.arrays import ROW
 from ctr_pvs.kernel.arrays import SCALE
 from ctr_pvs.kernel.arrays import SIZE
-from ctr_pvs.kernel.arrays import SPRINGS
 from ctr_pvs.kernel.arrays import STIFFNESS
 from ctr_pvs.kernel.arrays import TORQUE
 from ctr_pvs.kernel.arrays import TURNED
@@ -56,9 +55,10 @@ from ctr_pvs.kernel.twist.fields import turn_moments
 from ctr_pvs.kernel.twist.fields import used
 from ctr_pvs.kernel.twist.fields import used_bending
 
-#: What stands for the cosines in a Hessian: themselves, their least value on the box that holds the angles ``before``
-#: and the present ones, or the least value there is.
-EXACT, LOWERED, WORST = 0, 1, 2
+#: What stands for the cosines in a Hessian: themselves; their least value on the box that holds the angles ``before``
+#: and the present ones; the least value there is; or, at the two ends of a straight way, what makes the mean of both a
+#: bound for all on the way: cos and |sin| leave their chords by no more than an eighth of the square of the turn.
+EXACT, LOWERED, WORST, ALONG = 0, 1, 2, 3
 #: The branch between two states may leave the straight line between them: the box is this much wider on either side.
 WIDER = 0.25
 #: Below this turn [rad] two terms of Taylor's series bound a cosine as well as the cosine itself.
@@ -124,7 +124,7 @@ def energy_gradient(scene: Scene, bench: Bench, tubes: Array, rules: Array, alph
     spread_angles(scene, alpha, scene.vectors[Y])
     clear_torques(scene)
     if scene.counts[N_LOADS] > 0:
-        bend(scene, rules)
+        bend(scene, rules, False)
         chain(scene, tubes, rules)
         spread_loads(scene, bench, rules)
         twist_by_moments(scene)
@@ -141,16 +141,18 @@ def energy_gradient(scene: Scene, bench: Bench, tubes: Array, rules: Array, alph
 
 
 @compiled
-def spring(b: complex, c: complex, moved: float, slack: float, kind: int) -> float:
-    """Re(conj(b) c) [N^2 m^2], |b| |c| times the cosine of the angle between two turned moments; or with the cosine's
-    least value when that angle has moved by ``moved`` [rad], and ``slack`` more: a lower bound on that box."""
-    product = b.conjugate() * c
+def spring(product: complex, moved: float, slack: float, kind: int) -> float:
+    """Re(product) [N^2 m^2], product = conj(b) c: |b| |c| times the cosine of the angle between two turned moments.  Or
+    a lower bound by ``kind``, where that angle has moved by ``moved`` [rad] and ``slack`` more."""
     if kind == EXACT:
         return product.real
-    size = abs(product)
+    size = math.sqrt(product.real * product.real + product.imag * product.imag)
     if kind == WORST:
         return -size
     turned = abs(moved)
+    if kind == ALONG:
+        curved = 0.125 * turned * turned * (1.0 + slack) + 0.5 * slack * slack
+        return product.real - abs(product.imag) * slack - size * curved
     if turned < SMALL_TURN:
         reach = (1.0 + WIDER) * turned + slack
         return max(-size, product.real - abs(product.imag) * reach - 0.5 * size * reach * reach)
@@ -180,68 +182,75 @@ def element_hessian(
     n += 2 * used_bending(scene.marks[m, MU_SIZE], which)
     if not scene.marks[m, COUPLED]:
         return n
-    G, start = scene.marks[m, GAUSS], n + scene.counts[LEAD]
-    stiff = bench.squares[SPRINGS]
-    for g in range(G):
-        springs(scene, m, g, kind, slack, stiff)
-        for i in range(N):
-            if scene.parts[SIZE, m, i] < 2:
-                continue
-            for j in range(N):
-                if scene.parts[SIZE, m, j] > 1:
-                    add_spring(scene, bench, rules, m, g, i, j, stiff[i, j], which, start, A)
+    start = n + scene.counts[LEAD]
+    for i in range(N):
+        if scene.parts[SIZE, m, i] < 2:
+            continue
+        wide = used(scene.parts[SIZE, m, i], which) + 1  # of all tubes that are curved here
+        if scene.marks[m, LOADED]:
+            sum_springs(scene, rules, m, i, i, kind, slack, wide, bench.sums)
+            add_springs(scene, bench, m, i, i, 1.0, start, wide, A)
+        for j in range(i):
+            if scene.parts[SIZE, m, j] > 1:
+                sum_springs(scene, rules, m, i, j, kind, slack, wide, bench.sums)
+                add_springs(scene, bench, m, i, i, 1.0, start, wide, A)
+                add_springs(scene, bench, m, j, j, 1.0, start, wide, A)
+                add_springs(scene, bench, m, i, j, -1.0, start, wide, A)
     if scene.marks[m, LOADED]:
         load_hessian(scene, bench, rules, m, which, n, A)
     return n
 
 
 @compiled
-def springs(scene: Scene, m: int, g: int, kind: int, slack: float, out: Array) -> None:
-    """Second derivatives of the bending energy along psi at Gauss point g of element m into ``out`` (N, N) [N m]:
-    springs between every two tubes, and to the moment of the loads."""
-    N, row = scene.base.shape[1], scene.marks[m, ROW] + g
-    share = scene.gauss[row, WEIGHT] / scene.line[m, STIFFNESS]
-    moment = scene.bends[row, MOMENT]
-    for i in range(N):
+def sum_springs(
+    scene: Scene, rules: Array, m: int, i: int, j: int, kind: int, slack: float, wide: int, out: Array
+) -> None:  # fmt: skip
+    """The springs c [N m] between tubes i and j at the Gauss points of element m, or for i = j between tube i and the
+    moment of the loads, as one of psi's unknowns: sum c w w^T into the first ``wide`` rows of ``out``, w the
+    integrals of the polynomials and, last, 1, for psi at the element's start."""
+    G, last = scene.marks[m, GAUSS], wide - 1
+    for k in range(last + 1):
+        for r in range(k + 1):
+            out[k, r] = 0.0
+    for g in range(G):
+        row = scene.marks[m, ROW] + g
+        c = scene.gauss[row, WEIGHT] / scene.line[m, STIFFNESS]
         b = scene.moments[TURNED, row, i]
-        out[i, i] = share * (moment.real * b.real + moment.imag * b.imag)
-    for i in range(N):
-        for j in range(i):
-            if scene.parts[SIZE, m, i] < 2 or scene.parts[SIZE, m, j] < 2:
-                continue
-            moved = 0.0
-            if kind == LOWERED:
-                moved = (
-                    scene.turns[PSI, row, i]
-                    - scene.turns[BEFORE, row, i]
-                    - scene.turns[PSI, row, j]
-                    + scene.turns[BEFORE, row, j]
-                )
-            c = share * spring(scene.moments[TURNED, row, j], scene.moments[TURNED, row, i], moved, slack, kind)
-            out[i, i] += c
-            out[j, j] += c
-            out[i, j] = -c
-            out[j, i] = -c
+        if i == j:
+            moment = scene.bends[row, MOMENT]
+            c *= moment.real * b.real + moment.imag * b.imag
+        else:
+            moved = (scene.turns[PSI, row, i] - scene.turns[BEFORE, row, i]) - (
+                scene.turns[PSI, row, j] - scene.turns[BEFORE, row, j]
+            )
+            c *= spring(scene.moments[TURNED, row, j].conjugate() * b, moved, slack, kind)
+        for k in range(last):
+            a = c * rules[G, g, INTEGRAL + k]
+            for r in range(k + 1):
+                out[k, r] += a * rules[G, g, INTEGRAL + r]
+            out[last, k] += a
+        out[last, last] += c
+    for k in range(last):
+        for r in range(k):
+            out[r, k] = out[k, r]
 
 
 @compiled
-def add_spring(
-    scene: Scene, bench: Bench, rules: Array, m: int, g: int, i: int, j: int, c: float, which: int, start: int, A: Array
-) -> None:
-    """Adds c dpsi_i dpsi_j [N m] at Gauss point g of element m to the lower triangle of A; psi at the element's start
-    begins at the row ``start``."""
-    G = scene.marks[m, GAUSS]
-    ni, nj = used(scene.parts[SIZE, m, i], which), used(scene.parts[SIZE, m, j], which)
+def add_springs(
+    scene: Scene, bench: Bench, m: int, i: int, j: int, sign: float, start: int, wide: int, A: Array
+) -> None:  # fmt: skip
+    """Adds ``sign`` times the springs of ``sums``, of ``wide`` rows, between psi_i and psi_j of element m, i >= j, to
+    the lower triangle of A; psi at the element's start begins at the row ``start``."""
+    sums, last = bench.sums, wide - 1
     oi, oj = bench.offset[i], bench.offset[j]
-    si, sj = c * scene.held[SCALE, m, i], scene.held[SCALE, m, j]
-    if i >= j:
-        for k in range(ni):
-            a = si * rules[G, g, INTEGRAL + k] * sj
-            for r in range(k + 1 if i == j else nj):
-                A[oi + k, oj + r] += a * rules[G, g, INTEGRAL + r]
-        A[start + i, start + j] += c
-    for r in range(nj):
-        A[start + i, oj + r] += c * sj * rules[G, g, INTEGRAL + r]
+    si, sj = sign * scene.held[SCALE, m, i], scene.held[SCALE, m, j]
+    for k in range(last):
+        for r in range(k + 1 if i == j else last):
+            A[oi + k, oj + r] += si * sj * sums[k, r]
+        A[start + i, oj + k] += sign * sj * sums[last, k]
+        if i != j:
+            A[start + j, oi + k] += si * sums[last, k]
+    A[start + i, start + j] += sign * sums[last, last]
 
 
 @compiled
@@ -250,7 +259,7 @@ def energy_value(scene: Scene, tubes: Array, rules: Array, alpha: Array) -> floa
     loaded = scene.counts[N_LOADS] > 0
     spread_angles(scene, alpha, scene.vectors[Y])
     if loaded:
-        bend(scene, rules)
+        bend(scene, rules, False)
         chain(scene, tubes, rules)
     value = 0.0
     for u in range(scene.counts[N_UNKNOWNS]):

@@ -95,7 +95,8 @@ def flow(scene: Scene, bench: Bench, tubes: Array, rules: Array, alpha: Array, c
         if twist_size(scene, scene.vectors[GRADIENT], COARSE) < clock[2]:
             for u in range(U):
                 start[u] = scene.vectors[Y, u]
-            if correct(scene, bench, tubes, rules, alpha, COARSE, False, 0.0) > 0:
+            taken, _ = correct(scene, bench, tubes, rules, alpha, False, 0.0)
+            if taken > 0 and factorize(scene, bench, rules, COARSE, EXACT, 0.0, 0.0, -1.0):
                 for u in range(U):
                     whole[u] = scene.vectors[Y, u] - start[u]
                 if twist_size(scene, whole, COARSE) < LAST_WAY:

@@ -37,6 +37,8 @@ from ctr_pvs.kernel.twist.fields import FINE
 MOST_VECTORS, SETTLED = ROWS - 2, 1e-13
 #: Below this a new vector is rounding: the space is exhausted.
 BREAKDOWN = 1e-12
+#: A step of Newton by less than this share is rounding.
+ROUNDED = 4e-16
 
 
 @compiled
@@ -129,7 +131,7 @@ def largest_compliance(scene: Scene, bench: Bench, which: int) -> float:
             size += w[u] * w[u]
         size = math.sqrt(size)
         previous = largest
-        largest = largest_eigenvalue(diagonal, side, count)
+        largest = largest_eigenvalue(diagonal, side, count, previous)
         if size < BREAKDOWN * largest or largest - previous <= SETTLED * largest:
             break
         if k + 1 < most:
@@ -140,27 +142,20 @@ def largest_compliance(scene: Scene, bench: Bench, which: int) -> float:
 
 
 @compiled
-def largest_eigenvalue(diagonal: Array, side: Array, n: int) -> float:
-    """Of the symmetric tridiagonal matrix with ``diagonal`` (n,) and ``side`` (n - 1,), by bisection on its inertia."""
-    low, high = -math.inf, -math.inf
-    for i in range(n):
-        left = abs(side[i - 1]) if i > 0 else 0.0
-        right = abs(side[i]) if i < n - 1 else 0.0
-        low, high = max(low, diagonal[i]), max(high, diagonal[i] + left + right)
-    while high - low > 4e-16 * max(abs(low), abs(high)):
-        middle = 0.5 * (low + high)
-        if middle <= low or middle >= high:
-            break
-        below, pivot = 0, 1.0
+def largest_eigenvalue(diagonal: Array, side: Array, n: int, before: float) -> float:
+    """Of the symmetric tridiagonal matrix with ``diagonal`` (n,) and ``side`` (n - 1,), whose first n - 1 rows have
+    ``before``: by Newton on the characteristic polynomial from above all roots, where it falls to the largest."""
+    if n == 1:
+        return float(diagonal[0])
+    x = max(before, diagonal[n - 1]) + abs(side[n - 2])  # above all by Weyl's inequality
+    while True:
+        ratio, pivot, rate = 0.0, 1.0, 0.0  # p' / p, and the pivots of x - T with their derivatives
         for i in range(n):
-            step = side[i - 1] * side[i - 1] / pivot if i > 0 else 0.0
-            pivot = middle - diagonal[i] - step
-            if pivot == 0.0:
-                pivot = 1e-300
-            if pivot > 0.0:
-                below += 1
-        if below == n:
-            high = middle
-        else:
-            low = middle
-    return high
+            share = side[i - 1] * side[i - 1] / (pivot * pivot) if i > 0 else 0.0
+            pivot, rate = x - diagonal[i] - share * pivot, 1.0 + share * rate
+            if not pivot > 0.0:
+                return x
+            ratio += rate / pivot
+        if not 1.0 / ratio > ROUNDED * x:
+            return x
+        x -= 1.0 / ratio

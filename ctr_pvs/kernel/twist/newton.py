@@ -53,11 +53,12 @@ from ctr_pvs.kernel.twist.fields import turn_moments
 from ctr_pvs.kernel.twist.fields import used
 from ctr_pvs.kernel.twist.fields import used_bending
 
-#: A Newton step shorter than this [rad] leaves about its square: time to look at the residual.
-LAST_STEP = 2e-6
+#: A Newton step shorter than this [rad] leaves about its square; one of an older factorisation leaves a tenth at most.
+LAST_STEP, LAST_CHORD = 2e-6, 1e-8
 MOST_STEPS = 12
-#: Under load, after a Newton step shorter than this [rad] its factorisation serves again; and what is short then.
-CHORD, LAST_CHORD = 0.05, 1e-9
+#: After a step shorter than this [rad] its factorisation serves again, while each step with it is shorter than the one
+#: before by the second number: a factorisation costs as much as a gradient and a solution, under load three times that.
+CHORD, CHORD_CONTRACTION = 0.05, 0.1
 #: A step that is not shorter than the one before by this factor is not Newton converging.
 CONTRACTION = 0.5
 #: Under load nothing proves that a step keeps its branch: its correction must be this much shorter than the tangent.
@@ -150,38 +151,44 @@ def predict(scene: Scene, bench: Bench, tubes: Array, rules: Array, before: Arra
 
 @compiled
 def correct(
-    scene: Scene, bench: Bench, tubes: Array, rules: Array, alpha: Array, which: int, unique: bool, first: float
-) -> int:
-    """Newton from ``y`` to the equilibrium at alpha (N,) [rad]; the steps it took, or minus them if it failed.
+    scene: Scene, bench: Bench, tubes: Array, rules: Array, alpha: Array, unique: bool, first: float
+) -> tuple[int, float]:
+    """Newton from ``y`` to the equilibrium at alpha (N,) [rad]: the steps it took, or minus them if it failed, and how
+    far they went in all [rad].  The gradient there stays in ``scene``.
 
     It keeps to the basin it starts in: it stops rather than take a longer second step.  unique :
     there is but one equilibrium; then steps are only kept from being too long.  first : length [rad] of the step that
     predicted ``y``, which the next one under load must not come near; 0 if none did.
     """
-    previous, steps, chord = math.inf, 0, False
-    if scene.counts[N_LOADS] > 0 and first > 0.0:
-        previous, steps, chord = LOADED_CONTRACTION / CONTRACTION * first, 1, first < CHORD
-    while steps < MOST_STEPS * (4 if unique else 1):
-        if chord:
-            energy_gradient(scene, bench, tubes, rules, alpha)
-            chord_step(scene, bench, bench.lines[NONE], which)
-        elif not newton_step(scene, bench, tubes, rules, alpha, bench.lines[NONE], which, EXACT, 0.0):
-            return -steps - 1
+    steps, way, size, previous, chord = 0, 0.0, math.inf, math.inf, 0.0 < first < CHORD
+    if first > 0.0:
+        size = first
+        if scene.counts[N_LOADS] > 0:
+            previous = LOADED_CONTRACTION / CONTRACTION * first
+    limit = residual_limit(alpha)
+    energy_gradient(scene, bench, tubes, rules, alpha)
+    while size > (LAST_CHORD if chord else LAST_STEP) or twist_size(scene, scene.vectors[GRADIENT], COARSE) > limit:
+        if steps == MOST_STEPS * (4 if unique else 1):
+            return -steps, way
         steps += 1
-        size = twist_size(scene, scene.vectors[STEP], which)
+        if not chord and not factorize(scene, bench, rules, COARSE, EXACT, 0.0, 0.0, -1.0):
+            return -steps, way
+        chord_step(scene, bench, bench.lines[NONE], COARSE)
+        size = twist_size(scene, scene.vectors[STEP], COARSE)
+        if chord and size > LAST_CHORD and not size < CHORD_CONTRACTION * previous:
+            size, chord = math.inf, False
+            continue
         share = 1.0
         if unique and size > 1.0:
             share = 1.0 / size
-        elif not unique and steps > 1 and size > LAST_STEP and not size < CONTRACTION * previous:
-            return -steps
+        elif not unique and size > LAST_STEP and not size < CONTRACTION * previous:
+            return -steps, way
         for u in range(scene.counts[N_UNKNOWNS]):
             scene.vectors[Y, u] += share * scene.vectors[STEP, u]
-        if size <= (LAST_CHORD if chord else LAST_STEP):
-            return steps
-        # A factorisation costs three times a gradient under load; the last one serves while it is nearly that of here.
-        chord = scene.counts[N_LOADS] > 0 and size < CHORD
-        previous = size
-    return -steps
+        way += share * size
+        chord, previous = size < CHORD, size
+        energy_gradient(scene, bench, tubes, rules, alpha)
+    return steps, way
 
 
 @compiled

@@ -16,11 +16,11 @@ from ctr_pvs.kernel.arrays import TWISTED
 from ctr_pvs.kernel.arrays import Array
 from ctr_pvs.kernel.arrays import Kit
 from ctr_pvs.kernel.arrays import Y
-from ctr_pvs.kernel.arrays import bench_of
-from ctr_pvs.kernel.arrays import scene_of
 from ctr_pvs.kernel.compiler import compiled
 from ctr_pvs.kernel.layout import prepare
-from ctr_pvs.kernel.twist.fields import COARSE
+from ctr_pvs.kernel.twist.condensation import factorize
+from ctr_pvs.kernel.twist.element import LOWERED
+from ctr_pvs.kernel.twist.fields import FINE
 from ctr_pvs.kernel.twist.margin import stability_margin
 from ctr_pvs.kernel.twist.newton import convex_everywhere
 from ctr_pvs.kernel.twist.newton import correct
@@ -33,7 +33,6 @@ from ctr_pvs.kernel.walk.step import OK
 from ctr_pvs.kernel.walk.step import TOO_SMALL
 from ctr_pvs.kernel.walk.step import finish
 from ctr_pvs.kernel.walk.step import open_state
-from ctr_pvs.kernel.walk.step import settle
 from ctr_pvs.kernel.walk.step import step
 from ctr_pvs.kernel.walk.step import try_untwisted
 from ctr_pvs.kernel.walk.step import write_state
@@ -51,7 +50,7 @@ def alone(kit: Kit, alpha: Array, D: Array, tolerance: float, untwisted: bool, o
     """The unloaded equilibrium at (alpha, D), (N,) each, where it is the only one; else NOT_PROVEN.
 
     untwisted : take the state without twist where that is near enough."""
-    scene, bench = scene_of(kit, 0), bench_of(kit)
+    scene, bench = kit.scenes[0], kit.bench
     steps = 0
     for rung in range(len(RAISES)):
         if not prepare(kit, scene, D, alpha[:0], tolerance, RAISES[rung], 0):
@@ -67,14 +66,13 @@ def alone(kit: Kit, alpha: Array, D: Array, tolerance: float, untwisted: bool, o
                 scene.vectors[Y, u] = 0.0
         if not convex_everywhere(scene, bench, kit.rules, alpha):
             return NOT_PROVEN
-        taken = correct(scene, bench, kit.tubes, kit.rules, alpha, COARSE, True, 0.0)
+        taken, _ = correct(scene, bench, kit.tubes, kit.rules, alpha, True, 0.0)
         if taken < 0:
             return NOT_PROVEN
         remember(scene, kit.rules, alpha)
-        more = settle(scene, bench, kit.tubes, kit.rules, alpha, slack, 0.0)
-        if more < 0:
+        if not factorize(scene, bench, kit.rules, FINE, LOWERED, slack, 0.0, -1.0):
             return NOT_PROVEN
-        steps += taken + more
+        steps += taken
         if not write_state(scene, alpha, steps, TWISTED, out):
             return TOO_SMALL
         finish(scene, bench, kit.tubes, kit.rules, alpha, slack, tolerance, out)
@@ -93,7 +91,7 @@ def cold(kit: Kit, alpha: Array, D: Array, tolerance: float, untwisted: bool, st
     came = alone(kit, alpha, D, tolerance, untwisted, out)
     if came != NOT_PROVEN:
         return came
-    scene, bench = scene_of(kit, 0), bench_of(kit)
+    scene, bench = kit.scenes[0], kit.bench
     if not prepare(kit, scene, D, alpha[:0], tolerance, 0, PATH_DEGREE):
         return TOO_SMALL
     if len(state) < 7 * N:
@@ -125,6 +123,6 @@ def cold(kit: Kit, alpha: Array, D: Array, tolerance: float, untwisted: bool, st
     if max(out[S_ESTIMATE], out[S_SWUNG]) > tolerance:
         return NOT_PROVEN
     which = open_state(kit, out, tolerance)
-    if stability_margin(scene_of(kit, which), bench, kit.tubes, kit.rules, alpha) < DELICATE:
+    if stability_margin(kit.scenes[which], bench, kit.tubes, kit.rules, alpha) < DELICATE:
         return NOT_PROVEN
     return OK if found == 1 else MORE

@@ -40,11 +40,8 @@ from ctr_pvs.kernel.arrays import Bench
 from ctr_pvs.kernel.arrays import Kit
 from ctr_pvs.kernel.arrays import Scene
 from ctr_pvs.kernel.arrays import Y
-from ctr_pvs.kernel.arrays import bench_of
-from ctr_pvs.kernel.arrays import scene_of
 from ctr_pvs.kernel.backbone.estimate import backbone_motion
-from ctr_pvs.kernel.backbone.frames import bend
-from ctr_pvs.kernel.backbone.frames import chain
+from ctr_pvs.kernel.backbone.frames import put_frames
 from ctr_pvs.kernel.backbone.frames import put_pose
 from ctr_pvs.kernel.carry import alike
 from ctr_pvs.kernel.carry import carry
@@ -57,6 +54,7 @@ from ctr_pvs.kernel.loaded.tangent import solve_tangent
 from ctr_pvs.kernel.sections import FINER
 from ctr_pvs.kernel.sections import INTEGRATION_SHARE
 from ctr_pvs.kernel.twist.condensation import factorize
+from ctr_pvs.kernel.twist.element import ALONG
 from ctr_pvs.kernel.twist.element import EXACT
 from ctr_pvs.kernel.twist.element import LOWERED
 from ctr_pvs.kernel.twist.element import WIDER
@@ -69,7 +67,6 @@ from ctr_pvs.kernel.twist.newton import correct
 from ctr_pvs.kernel.twist.newton import largest_turn
 from ctr_pvs.kernel.twist.newton import predict
 from ctr_pvs.kernel.twist.newton import remember
-from ctr_pvs.kernel.twist.newton import residual_limit
 from ctr_pvs.kernel.twist.newton import slack_of
 from ctr_pvs.kernel.twist.newton import twist_size
 
@@ -86,8 +83,9 @@ LARGEST_SLIDE = 0.05
 SAFETY = 2.0
 #: The untwisted state is looked at where a crude bound of what its twist would move is within so many tolerances.
 PERHAPS_UNTWISTED = 30.0
-#: Tries to bring the residual down after the check has seen it.
-POLISHES = 3
+#: A base that turns takes this many times as much twist away, at most where no fold is near; where more is left than
+#: the line above leaves, no look is worth its time, a fifth of a step's.
+UNTWISTS = 4.0
 
 
 @compiled
@@ -97,8 +95,8 @@ def open_state(kit: Kit, state: Array, tolerance: float) -> int:
     D = state[STATE + N : STATE + 2 * N]
     raised, floor = int(state[S_RAISED]), int(state[S_FLOOR])
     loads = state[STATE + 3 * N : loads_end(state, N)]
-    which = 1 if holds(scene_of(kit, 1), D, loads, raised, floor) else 0
-    scene = scene_of(kit, which)
+    which = 1 if holds(kit.scenes[1], D, loads, raised, floor) else 0
+    scene = kit.scenes[which]
     if not prepare(kit, scene, D, loads, tolerance, raised, floor):
         return -1
     load_state(scene, state)
@@ -172,30 +170,31 @@ def step(
     which = open_state(kit, last, tolerance)
     if which < 0:
         return TOO_SMALL
-    old, bench = scene_of(kit, which), bench_of(kit)
+    old, bench = kit.scenes[which], kit.bench
     same = holds(old, D, loads, raised, floor)
-    new = old if same else scene_of(kit, 1 - which)
+    new = old if same else kit.scenes[1 - which]
     if not same and not prepare(kit, new, D, loads, tolerance, raised, floor):
         return TOO_SMALL
     before = last[STATE : STATE + N]
-    moved, turns, loaded = False, False, len(loads) > 0
+    moved, turn, loaded = False, 0.0, len(loads) > 0
     for j in range(N):
         moved = moved or D[j] != old.base[AT, j]
-        turns = turns or alpha[j] != before[j]
+        turn = max(turn, abs(alpha[j] - before[j]))
     if slack == 0.0:
         slack = slack_of(new, tolerance)
     set_out(old, new, kit.rules, before, same)
-    if untwisted and not loaded:
+    twist = 0.0 if moved else twist_size(new, new.vectors[Y], COARSE) - UNTWISTS * turn
+    if untwisted and not loaded and twist * new.base[SWING, 0] <= UNTWISTS * PERHAPS_UNTWISTED * tolerance:
         if try_untwisted(new, bench, kit.tubes, kit.rules, alpha, slack, tolerance, out):
             return OK
         load_state(old, last)
         set_out(old, new, kit.rules, before, same)
     first = 0.0
-    if turns or loaded:
+    if turn > 0.0 or loaded:
         first = predict(new, bench, kit.tubes, kit.rules, before, alpha)
     if loaded and not first < LARGEST_BEND:
         return NOT_PROVEN
-    steps = settle(new, bench, kit.tubes, kit.rules, alpha, slack, first)
+    steps, strayed = settle(new, bench, kit.tubes, kit.rules, alpha, slack, first)
     turned = largest_turn(new)
     if steps < 0 or turned > LARGEST_TURN:
         return NOT_PROVEN
@@ -203,6 +202,14 @@ def step(
         return TOO_SMALL
     if tip:
         finish(new, bench, kit.tubes, kit.rules, alpha, slack, tolerance, out)
+    if strayed > 0.0:
+        if same:
+            remember(new, kit.rules, alpha)
+        else:
+            remember_from(new, old, kit.rules, alpha)
+        load_state(old, last)
+        energy_gradient(old, bench, kit.tubes, kit.rules, before)
+        return OK if factorize(old, bench, kit.rules, FINE, ALONG, strayed, 0.0, -1.0) else NOT_PROVEN
     if moved and not loaded:
         load_state(old, last)
         if not certainly_convex(old, bench, kit.tubes, kit.rules, before, (1.0 + WIDER) * turned + slack):
@@ -226,24 +233,26 @@ def set_out(old: Scene, new: Scene, rules: Array, alpha: Array, same: bool) -> N
 @compiled
 def settle(
     scene: Scene, bench: Bench, tubes: Array, rules: Array, alpha: Array, slack: float, first: float
-) -> int:  # fmt: skip
+) -> tuple[int, float]:  # fmt: skip
     """Newton from ``y`` to the equilibrium at alpha (N,) [rad], and the check: the steps it took, -1 if it fails.
 
     The Hessian that is then factorised is that of the finer degree; without loads it is lowered to hold on the box
-    around the state, ``before`` and ``slack`` [rad] more.  first : length [rad] of the step that predicted ``y``."""
-    steps, kind = 0, LOWERED if scene.counts[N_LOADS] == 0 else EXACT
-    for _ in range(POLISHES):
-        taken = correct(scene, bench, tubes, rules, alpha, COARSE, False, first)
-        if taken < 0:
-            return -1
-        steps += taken
-        energy_gradient(scene, bench, tubes, rules, alpha)
-        if not factorize(scene, bench, rules, FINE, kind, slack, 0.0, -1.0):
-            return -1
-        if twist_size(scene, scene.vectors[GRADIENT], COARSE) <= residual_limit(alpha):
-            return steps
-        first = 0.0
-    return -1
+    around the state, ``before`` and ``slack`` [rad] more.  Where it does not hold there it may hold along the way: then
+    how far [rad] the branch may stray from the straight way also comes back, and the same check is to be made at its
+    other end; else 0.  first : length [rad] of the step that predicted ``y``."""
+    steps, corrected = correct(scene, bench, tubes, rules, alpha, False, first)
+    if steps < 0:
+        return -1, 0.0
+    if scene.counts[N_LOADS] > 0:
+        return (steps if factorize(scene, bench, rules, FINE, EXACT, 0.0, 0.0, -1.0) else -1), 0.0
+    if factorize(scene, bench, rules, FINE, LOWERED, slack, 0.0, -1.0):
+        return steps, 0.0
+    # Of a parabola the chord is as far as a quarter of what corrects the tangent; angles between tubes take twice that.
+    strayed = 2.0 * corrected + slack
+    near = first > 0.0 and corrected <= WIDER * largest_turn(scene)
+    if near and factorize(scene, bench, rules, FINE, ALONG, strayed, 0.0, -1.0):
+        return steps, strayed
+    return -1, 0.0
 
 
 @compiled
@@ -255,7 +264,6 @@ def finish(
     for u in range(scene.counts[N_UNKNOWNS]):
         scene.vectors[OTHER, u] = -scene.vectors[GRADIENT, u]
     solve_tangent(scene, bench, FINE, scene.vectors[OTHER], bench.lines[NONE], scene.vectors[STEP], 1.0)
-    bend(scene, rules)
     put_tip(scene, tubes, rules, out)
     change = twist_size(scene, scene.vectors[STEP], FINE)
     out[S_SWUNG] = change * scene.base[SWING, 0]
@@ -266,9 +274,9 @@ def finish(
 
 @compiled
 def put_tip(scene: Scene, tubes: Array, rules: Array, out: Array) -> None:
-    """Residual, number of unknowns and tip of a state whose gradient and curvature ``scene`` holds, into ``out``."""
+    """Residual, number of unknowns and tip of a state whose gradient ``scene`` holds, into ``out``."""
     out[S_RESIDUAL], out[S_SOLVED] = twist_size(scene, scene.vectors[GRADIENT], COARSE), solved_for(scene)
-    chain(scene, tubes, rules)
+    put_frames(scene, tubes, rules, True)
     M = scene.counts[N_ELEMENTS]
     put_pose(scene.frame[M, 0], scene.frame[M, 1], scene.held[ANGLE, M, scene.counts[LEADER]], out[S_ROLL : S_ROLL + 4])
     for i in range(3):
