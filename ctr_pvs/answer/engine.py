@@ -22,9 +22,9 @@ from ctr_pvs.kernel.arrays import SECTIONS
 from ctr_pvs.kernel.arrays import STATE
 from ctr_pvs.kernel.arrays import UNKNOWNS
 from ctr_pvs.kernel.arrays import WIDEST
-from ctr_pvs.kernel.arrays import workspace_sizes
 from ctr_pvs.kernel.walk.step import NOT_PROVEN
 from ctr_pvs.kernel.walk.step import TOO_SMALL
+from ctr_pvs.kernel.workspace import workspace_sizes
 from ctr_pvs.model.packing import packed_robot
 from ctr_pvs.model.packing import quadrature_rules
 from ctr_pvs.robot.robot import Robot

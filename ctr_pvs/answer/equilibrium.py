@@ -191,9 +191,7 @@ class Equilibrium:
     def _computed_loads(self) -> tuple[Loads, float]:
         """Loads by virtual work, and the elastic energy [J]."""
         numbers = self._numbers
-        interval = np.empty((len(self.D), 2))
-        interval[:, 0], interval[:, 1] = numbers[2], numbers[1]
-        return Loads(numbers[0], numbers[1], interval, numbers[3] > 0.0), float(numbers[4, 0])
+        return Loads(numbers[0], numbers[1], numbers[2:0:-1].T, numbers[3] > 0.0), float(numbers[4, 0])
 
     @cached_property
     def _numbers(self) -> Array:

@@ -18,7 +18,6 @@ from ctr_pvs.kernel.arrays import Array
 from ctr_pvs.kernel.arrays import Ints
 from ctr_pvs.kernel.arrays import Kit
 from ctr_pvs.kernel.arrays import Y
-from ctr_pvs.kernel.arrays import kit_of
 from ctr_pvs.kernel.carry import carry
 from ctr_pvs.kernel.carry import drop_finer
 from ctr_pvs.kernel.compiler import compiled
@@ -46,6 +45,7 @@ from ctr_pvs.kernel.walk.step import finish
 from ctr_pvs.kernel.walk.step import open_state
 from ctr_pvs.kernel.walk.step import step
 from ctr_pvs.kernel.walk.step import write_state
+from ctr_pvs.kernel.workspace import kit_of
 
 WORKSPACE = "float64[:, :, ::1], int64[::1], float64[:, :, ::1], float64[::1], int64[::1]"
 

@@ -62,7 +62,6 @@ from ctr_pvs.kernel.arrays import Ints
 from ctr_pvs.kernel.arrays import Kit
 from ctr_pvs.kernel.arrays import Scene
 from ctr_pvs.kernel.arrays import Sections
-from ctr_pvs.kernel.arrays import sections_of
 from ctr_pvs.kernel.compiler import compiled
 from ctr_pvs.kernel.materials import guide_compliance
 from ctr_pvs.kernel.materials import is_curved
@@ -75,6 +74,7 @@ from ctr_pvs.kernel.sections import mark_loaded
 from ctr_pvs.kernel.sections import norm
 from ctr_pvs.kernel.sections import plan_sections
 from ctr_pvs.kernel.sections import stiffness_of
+from ctr_pvs.kernel.workspace import sections_of
 
 
 @compiled

@@ -38,7 +38,6 @@ from ctr_pvs.kernel.arrays import Array
 from ctr_pvs.kernel.arrays import Complex
 from ctr_pvs.kernel.arrays import Ints
 from ctr_pvs.kernel.arrays import Y
-from ctr_pvs.kernel.arrays import kit_of
 from ctr_pvs.kernel.backbone.frames import put_frames
 from ctr_pvs.kernel.backbone.poses import trace
 from ctr_pvs.kernel.carry import angle_at
@@ -62,6 +61,7 @@ from ctr_pvs.kernel.walk.step import TOO_SMALL
 from ctr_pvs.kernel.walk.step import open_state
 from ctr_pvs.kernel.walk.step import put_tip
 from ctr_pvs.kernel.walk.step import write_state
+from ctr_pvs.kernel.workspace import kit_of
 
 
 @entry_point(f"float64({WORKSPACE}, float64[::1], float64)")

@@ -20,6 +20,7 @@ from ctr_pvs.kernel.twist.newton import newton_step
 from ctr_pvs.kernel.walk.step import NOT_PROVEN
 from ctr_pvs.kernel.walk.step import OK
 from ctr_pvs.kernel.walk.step import open_state
+from ctr_pvs.kernel.workspace import kit_of
 
 UNSTABLE = -1.0
 
@@ -27,7 +28,7 @@ UNSTABLE = -1.0
 def newton_step_of_kernel(engine, state, turned, finer):
     """The step (U,) that the kernel takes from any ``state`` while the bases turn by ``turned`` (N,) [rad]; None if it
     finds the Hessian not positive definite."""
-    kit = arrays.kit_of(*engine.fixed())
+    kit = kit_of(*engine.fixed())
     scene, bench = kit.scenes[open_state(kit, state.vector, engine.tolerance)], kit.bench
     good = newton_step(scene, bench, kit.tubes, kit.rules, state.alpha, turned, finer, EXACT, 0.0)
     return scene.vectors[arrays.STEP, : len(state.unknowns)].copy() if good else None

@@ -27,6 +27,7 @@ from ctr_pvs.kernel.twist.fields import COARSE
 from ctr_pvs.kernel.twist.fields import FINE
 from ctr_pvs.kernel.twist.fields import field_of
 from ctr_pvs.kernel.twist.margin import stability_margin
+from ctr_pvs.kernel.workspace import kit_of
 from ctr_pvs.model.packing import packed_loads
 from ctr_pvs.robot.loads import ZERO
 from ctr_pvs.robot.loads import Loads
@@ -50,10 +51,10 @@ class Loaded:
     ) -> None:
         engine = Engine(robot, TOLERANCE)
         packed = packed_loads(robot, D, loads)
-        self.kit = arrays.kit_of(*engine.fixed())
+        self.kit = kit_of(*engine.fixed())
         while not prepare(self.kit, self.kit.scenes[0], D, packed, TOLERANCE, 0, degree):
             engine.grow()
-            self.kit = arrays.kit_of(*engine.fixed())
+            self.kit = kit_of(*engine.fixed())
         self.robot, self.alpha = robot, alpha
         self.scene, self.bench = self.kit.scenes[0], self.kit.bench
         self.n = int(self.scene.counts[arrays.N_UNKNOWNS])
