@@ -101,6 +101,17 @@ def test_level_and_degrees_have_no_history(seed_robot, tolerance):
         assert answer.tip.position == pytest.approx(first.tip.position, abs=1e-11)
 
 
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-4, 1e-6])
+def test_small_steps_up_and_down_find_the_same_levels(seed_robot, tolerance):
+    """Where twist is large the untwisted state is not even looked at; that shows in no level on the way back."""
+    solver, levels = EquilibriumSolver(seed_robot, tolerance), []
+    angles = np.radians(0.1 * np.arange(250))
+    for angle in [*angles, *angles[::-1]]:
+        levels.append(solver.solve([0.0, angle], PARTIAL).fidelity)
+    assert levels[:250] == levels[:249:-1]
+    assert set(levels) == {"torsionless", "torsion"}
+
+
 @pytest.mark.parametrize(
     ("tolerance", "levels", "fewest"),
     [(1e-4, {"torsionless", "torsion"}, 3), (1e-5, {"torsion"}, 2), (1e-7, {"torsion"}, 3)],
