@@ -32,6 +32,8 @@ from ctr_pvs_ros.client.status_client import StatusClient
 from ctr_pvs_ros.client.status_client import StatusWatcher
 
 ANSWERED, NOT_ANSWERED, BAD_USAGE, INTERRUPTED = 0, 1, 2, 130
+#: What only shows what others do goes on until it is told to end, which is no interruption.
+LOOKING = ("watch", "view")
 # What a wrong namespace, node name or domain ends in; rclpy's RCLError is a RuntimeError.
 START_FAULTS = (NameValidationException, RuntimeError)
 TIME_TO_FIND = 5.0  # s; after it the watcher says that it waits
@@ -53,7 +55,7 @@ def main(arguments: argparse.Namespace) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return ANSWERED
     except KeyboardInterrupt:
-        return INTERRUPTED
+        return ANSWERED if arguments.command in LOOKING else INTERRUPTED
 
 
 @contextmanager
@@ -107,18 +109,15 @@ def _send(node: Node, arguments: argparse.Namespace) -> int:
 
 def _watch(node: Node, arguments: argparse.Namespace) -> int:
     as_line = client_texts.status_as_json if arguments.json else client_texts.status_as_line
+    watcher = StatusWatcher(node, arguments.node)
     try:
-        watcher = StatusWatcher(node, arguments.node)
-        try:
-            watcher.wait_for_node(TIME_TO_FIND)
-        except NoReply as error:
-            print(f"ctr_client: {error}, waiting", file=sys.stderr)
-        for count, (status, tip) in enumerate(watcher.follow(), start=1):
-            print(as_line(status, tip), flush=True)
-            if count == arguments.count:
-                break
-    except KeyboardInterrupt:
-        pass
+        watcher.wait_for_node(TIME_TO_FIND)
+    except NoReply as error:
+        print(f"ctr_client: {error}, waiting", file=sys.stderr)
+    for count, (status, tip) in enumerate(watcher.follow(), start=1):
+        print(as_line(status, tip), flush=True)
+        if count == arguments.count:
+            break
     return ANSWERED
 
 
@@ -133,8 +132,6 @@ def _view(node: Node, arguments: argparse.Namespace) -> int:
     try:
         print(f"{follower.name}: {address_of(server)} (Ctrl-C ends)", flush=True)
         follower.show_on(page)
-    except KeyboardInterrupt:
-        pass
     finally:
         page.stop()
     return ANSWERED
