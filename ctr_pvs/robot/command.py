@@ -53,6 +53,7 @@ class CommandBounds:
             (0.0, length) if limit is None else (max(limit[0], 0.0), min(limit[1], length))
             for length, limit in zip(lengths, D_limits, strict=True)
         ]
+        # Of each tube side by side, as nearly every command is checked: that takes three fifths of the time.
         self._ranges = [(*a, *d) for a, d in zip(self._alpha_ranges, self._D_ranges, strict=True)]
         self._check_that_a_command_exists()
         # With D in order, tube j is held up by the lower bounds of the tubes before it and down by the upper bounds of

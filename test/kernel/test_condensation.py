@@ -14,7 +14,6 @@ from test_element import scene_of
 
 from ctr_pvs import EquilibriumSolver
 from ctr_pvs.kernel import arrays
-from ctr_pvs.kernel.twist.element import EXACT
 from ctr_pvs.kernel.twist.margin import largest_eigenvalue
 from ctr_pvs.kernel.twist.newton import newton_step
 from ctr_pvs.kernel.walk.step import NOT_PROVEN
@@ -30,7 +29,7 @@ def newton_step_of_kernel(engine, state, turned, finer):
     finds the Hessian not positive definite."""
     kit = kit_of(*engine.fixed())
     scene, bench = kit.scenes[open_state(kit, state.vector, engine.tolerance)], kit.bench
-    good = newton_step(scene, bench, kit.tubes, kit.rules, state.alpha, turned, finer, EXACT, 0.0)
+    good = newton_step(scene, bench, kit.tubes, kit.rules, state.alpha, turned, finer)
     return scene.vectors[arrays.STEP, : len(state.unknowns)].copy() if good else None
 
 

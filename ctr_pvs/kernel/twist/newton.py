@@ -57,7 +57,7 @@ from ctr_pvs.kernel.twist.fields import used_bending
 LAST_STEP, LAST_CHORD = 2e-6, 1e-8
 MOST_STEPS = 12
 #: After a step shorter than this [rad] its factorisation serves again, while each step with it is shorter than the one
-#: before by the second number: a factorisation costs as much as a gradient and a solution, under load three times that.
+#: before by the second number: a factorisation costs about as much as a gradient and a solution, under load more.
 CHORD, CHORD_CONTRACTION = 0.05, 0.1
 #: A step that is not shorter than the one before by this factor is not Newton converging.
 CONTRACTION = 0.5
@@ -115,13 +115,12 @@ def slack_of(scene: Scene, tolerance: float) -> float:
 
 @compiled
 def newton_step(
-    scene: Scene, bench: Bench, tubes: Array, rules: Array, alpha: Array, turned: Array, which: int, kind: int,
-    slack: float,
+    scene: Scene, bench: Bench, tubes: Array, rules: Array, alpha: Array, turned: Array, which: int
 ) -> bool:  # fmt: skip
     """Newton's step at alpha (N,) and ``y`` into ``step``, while the base angles turn by ``turned`` (N,);
-    false if the Hessian, or its bound by ``kind`` and ``slack``, is not positive definite."""
+    false if the Hessian is not positive definite."""
     energy_gradient(scene, bench, tubes, rules, alpha)
-    if not factorize(scene, bench, rules, which, kind, slack, 0.0, -1.0):
+    if not factorize(scene, bench, rules, which, EXACT, 0.0, 0.0, -1.0):
         return False
     chord_step(scene, bench, turned, which)
     return True
@@ -142,7 +141,7 @@ def predict(scene: Scene, bench: Bench, tubes: Array, rules: Array, before: Arra
     turned = bench.lines[TURNED_BY]
     for j in range(len(alpha)):
         turned[j] = alpha[j] - before[j]
-    if not newton_step(scene, bench, tubes, rules, before, turned, COARSE, EXACT, 0.0):
+    if not newton_step(scene, bench, tubes, rules, before, turned, COARSE):
         return math.inf
     for u in range(scene.counts[N_UNKNOWNS]):
         scene.vectors[Y, u] += scene.vectors[STEP, u]
